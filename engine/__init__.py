@@ -1,0 +1,3 @@
+"""The estimation engine: scenario -> mission -> log -> estimators -> tracks -> metrics and claims."""
+
+__version__ = "0.1.0"
