@@ -1,0 +1,1 @@
+"""Gaussian algebra: moment and information forms, and links between two instants."""

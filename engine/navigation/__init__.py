@@ -1,0 +1,11 @@
+"""Cooperative navigation by one-way travel times (W11, W12): one file per estimator."""
+
+from engine.navigation.cekf import CEKF
+from engine.navigation.dead_reckoning import DEAD_RECKONING
+from engine.navigation.mission import fly_navigation
+from engine.navigation.nekf import NEKF
+from engine.registry import Family
+
+NAVIGATION = Family(name="navigation", title="Cooperative navigation", fly=fly_navigation)
+
+REGISTERED = (NAVIGATION, DEAD_RECKONING, CEKF, NEKF)

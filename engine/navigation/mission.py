@@ -1,0 +1,105 @@
+"""A navigation mission ready for estimators: local logs as chains of links, and the events of the channel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from engine.mission import fly
+from engine.mission.log import Log
+from engine.navigation.chains import Chain, chain, depth_at
+
+
+@dataclass(frozen=True)
+class Launch:
+    """Broadcast `index` leaves `vehicle`, whose depth then reads depth_m (trials or 1,); `audience` may hear it."""
+
+    time_s: float
+    index: int
+    vehicle: int
+    depth_m: np.ndarray
+    audience: int
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Broadcast `index` reaches `vehicle`: slant_m (trials,) is NaN where nothing was heard; depth_m its own."""
+
+    time_s: float
+    index: int
+    vehicle: int
+    slant_m: np.ndarray
+    depth_m: np.ndarray
+    last: bool
+
+
+@dataclass(frozen=True)
+class Report:
+    """Report time number `index`: everyone says where it is."""
+
+    time_s: float
+    index: int
+
+
+Event = Launch | Arrival | Report
+
+
+@dataclass(frozen=True)
+class NavigationMission:
+    """One block of trials: its log, a chain per vehicle, and the events in order of time."""
+
+    log: Log
+    chains: tuple[Chain, ...]
+    events: tuple[Event, ...]
+
+    @property
+    def time_s(self) -> np.ndarray:
+        return self.log.time_s
+
+    @property
+    def truth(self) -> dict[str, np.ndarray]:
+        return self.log.truth
+
+    @property
+    def trials(self) -> int:
+        return self.log.trials
+
+
+def prepare(log: Log) -> NavigationMission:
+    """Compress every vehicle's log between the instants that concern it, and order the channel's events.
+
+    At one instant, what was heard counts before what is said, and both before the report.
+    """
+    acoustics = log.acoustics
+    events: list[tuple[float, int, int, Event]] = []
+    audience = np.bincount(acoustics.broadcast, minlength=len(acoustics.tol_s)).tolist()
+    last = {int(b): r for r, b in enumerate(acoustics.broadcast)}
+    slant = acoustics.travel_time_s * log.sound_speed_mps
+    for v, vehicle in enumerate(log.vehicles):
+        mine = np.flatnonzero(acoustics.receiver == v)
+        depth = depth_at(vehicle, acoustics.toa_s[mine])
+        for n, r in enumerate(mine):
+            b = int(acoustics.broadcast[r])
+            arrival = Arrival(float(acoustics.toa_s[r]), b, v, slant[:, r], depth[:, n], last[b] == r)
+            events.append((arrival.time_s, 0, int(r), arrival))
+        mine = np.flatnonzero(acoustics.sender == v)
+        depth = depth_at(vehicle, acoustics.tol_s[mine])
+        for n, b in enumerate(mine):
+            launch = Launch(float(acoustics.tol_s[b]), int(b), v, depth[:, n], audience[b])
+            events.append((launch.time_s, 1, int(b), launch))
+    events += [(float(t), 2, k, Report(float(t), k)) for k, t in enumerate(log.time_s)]
+    events.sort(key=lambda e: e[:3])
+    ordered = tuple(e[3] for e in events if e[0] <= log.duration_s)
+
+    chains = []
+    for v, vehicle in enumerate(log.vehicles):
+        own = [e.time_s for e in ordered if isinstance(e, Report) or e.vehicle == v]
+        chains.append(chain(vehicle, np.unique(np.concatenate([[0.0], own])), log.trials))
+    return NavigationMission(log, tuple(chains), ordered)
+
+
+def fly_navigation(scenario, trials: Sequence[int]) -> NavigationMission:
+    """Simulate or read a navigation scenario's mission for the given trial numbers and prepare it."""
+    return prepare(fly(scenario, trials))
