@@ -41,16 +41,29 @@ class Algorithm:
 
 
 @dataclass(frozen=True)
+class Outline:
+    """What a mission looks like to someone watching its first trial, in JSON's own types.
+
+    subjects: {"name", "kind", "depth_m"} each; events in order of time: {"kind": "packet", "from", "to", "tol_s",
+    "toa_s", "heard"} and {"kind": "fix", "subject", "time_s"}, the latter at most one a second.
+    """
+
+    subjects: list[dict[str, Any]]
+    events: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
 class Family:
     """A kind of mission: `fly(scenario, trials)` makes the data every algorithm of the family works on.
 
-    What `fly` returns has `time_s` (T,) and `truth` {subject: (trials, T, 2)}; the rest is the family's own.
-    `accepts` names the families whose algorithms can run on it.
+    What `fly` returns has `time_s` (T,) and `truth` {subject: (trials or 1, T, 2)}; the rest is the family's own.
+    `outline(mission)` is for watchers. `accepts` names the families whose algorithms can run on it too.
     """
 
     name: str
     title: str
     fly: Callable[[Any, Sequence[int]], Any]
+    outline: Callable[[Any], Outline]
     accepts: tuple[str, ...] = ()
 
 

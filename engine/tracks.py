@@ -83,6 +83,27 @@ class Tracks:
     cpu_s: float = 0.0
 
 
+@dataclass(frozen=True)
+class Reference:
+    """The report times of a mission, time_s (T,), and its truth {subject: (trials or 1, T, 2)} to score against."""
+
+    time_s: np.ndarray
+    truth: dict[str, np.ndarray]
+
+
+def stack_references(blocks: list[tuple[Reference, int]]) -> Reference:
+    """Join the references of consecutive blocks, each with its number of trials; truth shared by all stays single."""
+    first = blocks[0][0]
+    truth = {}
+    for subject, position in first.truth.items():
+        if all(r.truth[subject].shape[0] == 1 for r, _ in blocks):
+            truth[subject] = position
+        else:
+            parts = [np.broadcast_to(r.truth[subject], (n, *position.shape[1:])) for r, n in blocks]
+            truth[subject] = np.concatenate(parts, axis=0)
+    return Reference(first.time_s, truth)
+
+
 def stack(blocks: list[Tracks]) -> Tracks:
     """Join the answers of consecutive blocks of trials along the trial axis; notes are kept once."""
     first = blocks[0]

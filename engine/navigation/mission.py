@@ -10,6 +10,7 @@ import numpy as np
 from engine.mission import fly
 from engine.mission.log import Log
 from engine.navigation.chains import Chain, chain, depth_at
+from engine.registry import Outline
 
 
 @dataclass(frozen=True)
@@ -103,3 +104,32 @@ def prepare(log: Log) -> NavigationMission:
 def fly_navigation(scenario, trials: Sequence[int]) -> NavigationMission:
     """Simulate or read a navigation scenario's mission for the given trial numbers and prepare it."""
     return prepare(fly(scenario, trials))
+
+
+def outline(mission: NavigationMission) -> Outline:
+    """Vehicles, packets and fixes of the first trial."""
+    log = mission.log
+    names = [v.name for v in log.vehicles]
+    events: list[dict] = []
+    tol = {e.index: e.time_s for e in mission.events if isinstance(e, Launch)}
+    sender = {e.index: e.vehicle for e in mission.events if isinstance(e, Launch)}
+    for e in mission.events:
+        if isinstance(e, Arrival):
+            heard = bool(np.isfinite(e.slant_m[0]))
+            events.append(
+                {
+                    "kind": "packet",
+                    "from": names[sender[e.index]],
+                    "to": names[e.vehicle],
+                    "tol_s": tol[e.index],
+                    "toa_s": e.time_s,
+                    "heard": heard,
+                }
+            )
+    for v in log.vehicles:
+        if v.fixes is not None and v.kind != "fixed":
+            _, first = np.unique(np.floor(v.fixes.time_s), return_index=True)
+            events += [{"kind": "fix", "subject": v.name, "time_s": float(t)} for t in v.fixes.time_s[first]]
+    events.sort(key=lambda e: e.get("toa_s", e.get("time_s")))
+    subjects = [{"name": v.name, "kind": v.kind, "depth_m": float(depth_at(v, np.zeros(1))[0, 0])} for v in log.vehicles]
+    return Outline(subjects, events)
