@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.mission import fly
 from engine.mission.log import Log
 from engine.navigation.chains import Chain, chain, depth_at
 from engine.registry import Outline
@@ -103,6 +102,8 @@ def prepare(log: Log) -> NavigationMission:
 
 def fly_navigation(scenario, trials: Sequence[int]) -> NavigationMission:
     """Simulate or read a navigation scenario's mission for the given trial numbers and prepare it."""
+    from engine.mission import fly
+
     return prepare(fly(scenario, trials))
 
 

@@ -1,0 +1,49 @@
+# make serve   set everything up and open the dashboard
+# make test    set everything up and run every test
+# make lint    ruff and pyright
+# make bench   speed against peers, in one run each
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PYTEST_ARGS ?=
+
+.PHONY: serve test lint bench browser clean
+
+serve: $(VENV)/.installed
+	$(BIN)/coopnav serve $(SERVE_ARGS)
+
+test: $(VENV)/.installed-test browser
+	$(BIN)/pytest $(PYTEST_ARGS)
+
+lint: $(VENV)/.installed-test
+	$(BIN)/ruff check engine server tests
+	$(BIN)/ruff format --check engine server tests
+	$(BIN)/pyright
+
+bench: $(VENV)/.installed-test
+	$(BIN)/pytest tests/benchmarks -o python_files='bench_*.py' -s
+
+# The browser tests need a Chromium: the one named or found, else Debian's.
+browser:
+	@if [ -z "$$COOPNAV_CHROMIUM" ] && ! command -v chromium >/dev/null && ! command -v chromium-browser >/dev/null \
+	    && ! command -v google-chrome >/dev/null; then \
+	  echo "no Chromium found: installing Debian's package chromium"; \
+	  if [ "$$(id -u)" = 0 ]; then SUDO=; else SUDO=sudo; fi; \
+	  $$SUDO apt-get update -qq && $$SUDO apt-get install -y -qq --no-install-recommends chromium >/dev/null \
+	    || { echo "install a Chromium, or name one in COOPNAV_CHROMIUM"; exit 1; }; \
+	fi
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "coopnav needs Python 3.11 or newer; set PYTHON=")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	touch $@
+
+$(VENV)/.installed-test: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,lint]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) build dist test-artifacts *.egg-info
