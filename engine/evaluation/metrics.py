@@ -1,0 +1,187 @@
+"""Figures of every algorithm and subject: error, believed error, consistency, correlation, ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from engine.evaluation.consistency import EXACT_M, interval, judge, nees, nees_interval, sigma, trial_mean
+from engine.tracks import Belief, Innovations, Series, Tracks
+
+#: One subject's metrics under the names of result.json; None where a figure does not exist.
+SubjectMetrics = dict[str, Any]
+
+
+class Scored(Protocol):
+    """Report times (T,) and truth {subject: (trials or 1, T, 2)}, NaN where there is no reference."""
+
+    @property
+    def time_s(self) -> np.ndarray: ...
+    @property
+    def truth(self) -> Mapping[str, np.ndarray]: ...
+
+
+@dataclass(frozen=True)
+class Curves:
+    """One subject over time, each (T,): RMS error over trials (m), mean sigma (m), trial-averaged NEES.
+
+    interval holds the NEES at 95 % of the times if the estimator is consistent. NaN where there is no
+    reference; nees is inf where a covariance is not positive definite.
+    """
+
+    error_m: np.ndarray
+    sigma_m: np.ndarray
+    nees: np.ndarray
+    interval: tuple[float, float]
+
+
+def curves(truth: np.ndarray | None, belief: Belief) -> Curves:
+    """Error, sigma and NEES over time of one belief against truth (trials or 1, T, 2) m, or None."""
+    trials, T = belief.mean.shape[:2]
+    if truth is None:
+        truth = np.full((1, T, 2), np.nan)
+    return Curves(
+        np.sqrt(_mean_square(truth, belief)),
+        sigma(belief).mean(axis=0),
+        trial_mean(nees(truth, belief))[0],
+        nees_interval(trials),
+    )
+
+
+def evaluate(
+    mission: Scored, results: Mapping[str, Tracks], centralized: str | None = None
+) -> dict[str, dict[str, SubjectMetrics]]:
+    """The metrics of every algorithm and subject as result.json has them; `centralized` names the benchmark.
+
+    rmse_m is over trials and times, final_rmse_m over trials at the last time with a reference; sigma_m is
+    the mean over trials and times of the fourth root of the xy covariance's determinant, final_sigma_m its
+    mean at the last time; anees the mean over times of the NEES averaged over trials; max_deviation_m the
+    largest distance over trials and times between the mean and the benchmark's. Undefined or infinite figures
+    are None.
+    """
+    benchmark = results[centralized].beliefs if centralized is not None and centralized in results else {}
+    return {
+        name: {
+            subject: _subject(mission.truth.get(subject), subject, tracks, benchmark.get(subject))
+            for subject in tracks.beliefs
+        }
+        for name, tracks in results.items()
+    }
+
+
+def _subject(
+    truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: Belief | None
+) -> SubjectMetrics:
+    belief = tracks.beliefs[subject]
+    if truth is None:
+        truth = np.full((1, belief.mean.shape[1], 2), np.nan)
+    spread = sigma(belief)
+    metrics = _error(truth, belief) | {
+        "sigma_m": number(spread.mean()),
+        "final_sigma_m": number(spread[:, -1].mean()),
+    }
+    ranges = gate(tracks.innovations[subject]) if subject in tracks.innovations else None
+
+    verdict = judge(nees(truth, belief))
+    name, consistent, sentence = verdict.name, verdict.consistent, verdict.sentence
+    if metrics["rmse_m"] is not None and name == "no reference":
+        name, consistent = "consistent", True
+        sentence = f"Consistent: it says that its position is known exactly, and it is, to {EXACT_M:g} m."
+    elif name == "no reference" and ranges and ranges["mean_nis"] is not None:
+        low, high = ranges["nis_interval"]
+        sentence += (
+            f" Of {ranges['offered']} ranges {ranges['accepted']} passed the gate; their squared innovations "
+            f"average {ranges['mean_nis']:.3g} of what was predicted ({low:.3g} to {high:.3g} at 95 %)."
+        )
+    metrics |= {
+        "anees": number(verdict.anees),
+        "anees_interval": list(verdict.interval),
+        "consistent": consistent,
+        "verdict": name,
+        "explanation": sentence,
+        "max_deviation_m": None
+        if benchmark is None
+        else number(_distance(belief.mean, benchmark.mean).max()),
+    }
+    together = correlations(subject, tracks.series)
+    if together:
+        metrics["correlation"] = together
+    if ranges:
+        metrics["ranges"] = ranges
+    return metrics
+
+
+def _error(truth: np.ndarray, belief: Belief) -> SubjectMetrics:
+    known = np.flatnonzero(np.isfinite(truth).all(axis=-1).any(axis=0))
+    if not known.size:
+        return {"rmse_m": None, "final_rmse_m": None}
+    weight = np.isfinite(truth).all(axis=-1).sum(axis=0)[known].astype(float)
+    square = _mean_square(truth, belief)[known]
+    return {
+        "rmse_m": number(np.sqrt((square * weight).sum() / weight.sum())),
+        "final_rmse_m": number(np.sqrt(square[-1])),
+    }
+
+
+def _mean_square(truth: np.ndarray, belief: Belief) -> np.ndarray:
+    """Squared error averaged over the trials with a reference, (T,) m^2; NaN where none has or one failed."""
+    square = _distance(belief.mean, truth) ** 2
+    known = np.broadcast_to(np.isfinite(truth).all(axis=-1), square.shape)
+    if known.all():
+        return square.mean(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.sum(square, axis=0, where=known) / known.sum(axis=0)
+
+
+def _distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    with np.errstate(invalid="ignore"):
+        difference = a - b
+        return np.hypot(difference[..., 0], difference[..., 1])
+
+
+def correlations(subject: str, series: Mapping[str, Series]) -> dict[str, dict[str, float | None]]:
+    """Correlation of `subject` with each other one of the series `correlation/A~B`, averaged over trials.
+
+    mean, min, max over time and the final value; drop is the largest fall from an earlier peak.
+    """
+    found = {}
+    for key, curve in series.items():
+        if not key.startswith("correlation/") or len(curve.subjects) != 2 or subject not in curve.subjects:
+            continue
+        other = curve.subjects[1 - curve.subjects.index(subject)]
+        value, _ = trial_mean(curve.value)
+        value = value[np.isfinite(value)]
+        if value.size:
+            found[other] = {
+                "mean": number(value.mean()),
+                "min": number(value.min()),
+                "max": number(value.max()),
+                "final": number(value[-1]),
+                "drop": number((np.maximum.accumulate(value) - value).max()),
+            }
+    return found
+
+
+def gate(innovations: Innovations) -> dict[str, Any]:
+    """Ranges offered and accepted over all trials, and the accepted ones' mean NIS, expected to be 1.
+
+    nis_interval holds the mean NIS at 95 % if the innovations are white; a gate lowers it a little.
+    """
+    offered = np.isfinite(innovations.value)
+    accepted = offered & innovations.accepted
+    n = int(accepted.sum())
+    square = innovations.value[accepted] ** 2 / innovations.variance[accepted]
+    return {
+        "offered": int(offered.sum()),
+        "accepted": n,
+        "mean_nis": number(square.mean()) if n else None,
+        "nis_interval": list(interval(1, n)) if n else None,
+    }
+
+
+def number(value: Any) -> float | None:
+    """A float for JSON, which knows neither NaN nor infinity: None."""
+    return float(value) if np.isfinite(value) else None
