@@ -105,7 +105,7 @@ def test_the_interval_holds_95_percent_of_the_trial_average(trials):
 def test_honest_errors_are_judged_consistent():
     verdict = judge(nees(*honest(2)))
     assert (verdict.name, verdict.consistent) == ("consistent", True)
-    # A chi-square variable of 2 dof has the standard deviation 2; their mean, 2 over the root of their number.
+    # A chi-square variable of 2 dof has the standard deviation 2; their mean has 2 over the root of n.
     assert abs(verdict.anees - 2.0) < 4 * 2.0 / np.sqrt(TRIALS * TIMES)
 
 

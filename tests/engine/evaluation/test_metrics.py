@@ -47,6 +47,13 @@ def test_a_truth_of_each_trial_scores_as_the_shared_one():
     assert scores(each, Tracks({"iver": BELIEF})) == scores(TRUTH, Tracks({"iver": BELIEF}))
 
 
+def test_every_error_with_a_reference_weighs_the_same():
+    truth = np.broadcast_to(TRUTH, (2, 3, 2)).copy()
+    truth[1, 1:] = np.nan
+    found = scores(truth, Tracks({"iver": BELIEF}))
+    assert found["rmse_m"] == pytest.approx(np.sqrt((25 + 0 + 1 + 0) / 4))
+
+
 def test_the_final_error_is_taken_where_the_reference_ends():
     truth = TRUTH.copy()
     truth[:, 2] = np.nan
