@@ -53,7 +53,11 @@ def chosen(scenario: ScenarioBase, algorithms: Sequence[str] | None = None) -> l
         if name not in known:
             fitting = sorted(a.name for a in known.values() if a.family in (family.name, *family.accepts))
             problems.append(
-                Problem(f"algorithms[{n}]", f"there is no algorithm named {name!r}", f"choose from: {', '.join(fitting)}")
+                Problem(
+                    f"algorithms[{n}]",
+                    f"there is no algorithm named {name!r}",
+                    f"choose from: {', '.join(fitting)}",
+                )
             )
         elif known[name].family not in (family.name, *family.accepts):
             problems.append(
@@ -94,9 +98,7 @@ def run_shard(scenario: ScenarioBase, shard: Shard, progress: Progress = silent)
     return Reference(mission.time_s, mission.truth), tracks
 
 
-def gather(
-    scenario: ScenarioBase, parts: Sequence[tuple[Shard, Reference, Tracks]], names: Sequence[str]
-) -> Result:
+def gather(scenario: ScenarioBase, parts: Sequence[tuple[Shard, Reference, Tracks]], names: Sequence[str]) -> Result:
     """The result of finished shards in any order; every algorithm must have the same blocks."""
     by_algorithm: dict[str, dict[int, Tracks]] = {name: {} for name in names}
     references: dict[int, tuple[Reference, int]] = {}

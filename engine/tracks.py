@@ -120,8 +120,7 @@ def stack(blocks: list[Tracks]) -> Tracks:
         },
         packets=sum((b.packets for b in blocks), PacketCount()),
         samples={
-            s: Samples(first.samples[s].time_s, join([b.samples[s].points for b in blocks]))
-            for s in first.samples
+            s: Samples(first.samples[s].time_s, join([b.samples[s].points for b in blocks])) for s in first.samples
         },
         innovations={
             s: Innovations(

@@ -109,3 +109,20 @@ def delta_information(link: Link) -> Information:
     vector[..., :n] = Lb
     vector[..., n:] = link.eta - apply(transpose(link.A), Lb)
     return Information(vector, symmetric(matrix))
+
+
+def from_delta(delta: Information) -> Link:
+    """The link whose delta information over (end, start) is given: the inverse of `delta_information`."""
+    n = delta.vector.shape[-1] // 2
+    end, start = slice(0, n), slice(n, 2 * n)
+    C = symmetric(np.linalg.inv(delta.matrix[..., end, end]))
+    A = -C @ delta.matrix[..., end, start]
+    b = apply(C, delta.vector[..., end])
+    cross = delta.matrix[..., start, end]
+    return Link(
+        A=A,
+        b=b,
+        C=C,
+        eta=delta.vector[..., start] - apply(cross, b),
+        J=symmetric(delta.matrix[..., start, start] + cross @ A),
+    )

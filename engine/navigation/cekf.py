@@ -59,9 +59,7 @@ class CekfFleet:
         )
         if arrival.last:
             self.joint = drop(self.joint, delayed)
-            self.launched = [
-                (other, at - 2 if at > start else at) for other, at in self.launched if at != start
-            ]
+            self.launched = [(other, at - 2 if at > start else at) for other, at in self.launched if at != start]
         return seen
 
     def belief(self, vehicle: int) -> Moments:

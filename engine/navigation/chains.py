@@ -10,6 +10,7 @@ plant (W11 eq. 2); one that integrates odometry is a pose x, y, heading; a fixed
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -258,18 +259,18 @@ class OdometryStep:
         c, s = np.cos(mean[..., 2]), np.sin(mean[..., 2])
         d = self.increment
         moved = np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
-        trials = moved.shape[0]
-        A = np.broadcast_to(np.eye(3), (trials, 3, 3)).copy()
+        lead = moved.shape[:-1]
+        A = np.broadcast_to(np.eye(3), (*lead, 3, 3)).copy()
         A[..., 0, 2] = -moved[..., 1]
         A[..., 1, 2] = moved[..., 0]
-        b = np.empty((trials, 3))
+        b = np.empty((*lead, 3))
         b[..., :2] = moved - A[..., :2, 2] * mean[..., 2:]
         b[..., 2] = d[..., 2]
-        turn = np.broadcast_to(np.eye(3), (trials, 3, 3)).copy()
+        turn = np.broadcast_to(np.eye(3), (*lead, 3, 3)).copy()
         turn[..., 0, 0] = turn[..., 1, 1] = c
         turn[..., 0, 1], turn[..., 1, 0] = -s, s
         C = turn @ self.cov @ np.swapaxes(turn, -1, -2)
-        link = Link(A, b, C, np.zeros((trials, 3)), np.zeros((trials, 3, 3)))
+        link = Link(A, b, C, np.zeros((*lead, 3)), np.zeros((*lead, 3, 3)))
         if self.fix is None or self.fix_cov is None:
             return link
         return compose(link, measurement(np.eye(3)[:2], self.fix_cov, self.fix))
@@ -288,11 +289,13 @@ def _odometry_chain(log: VehicleLog, odometry: Odometry, breakpoints_s: np.ndarr
         for k in range(len(times) - 1)
     ]
     ends = np.searchsorted(times, breakpoints_s)
-    steps: list[Step] = [
-        pieces[a] if b - a == 1 else _Several(tuple(pieces[a:b])) for a, b in zip(ends[:-1], ends[1:])
-    ]
+    steps: list[Step] = [pieces[a] if b - a == 1 else _Several(tuple(pieces[a:b])) for a, b in itertools.pairwise(ends)]
     mean = np.concatenate(
-        [np.broadcast_to(start.position_m, (trials, 2)), np.broadcast_to(start.heading_rad, (trials,))[:, None]], -1
+        [
+            np.broadcast_to(start.position_m, (trials, 2)),
+            np.broadcast_to(start.heading_rad, (trials,))[:, None],
+        ],
+        -1,
     )
     cov = np.zeros((trials, 3, 3))
     cov[:, :2, :2] = start.position_cov
@@ -336,7 +339,7 @@ def integrate(odometry: Odometry, times_s: np.ndarray) -> tuple[np.ndarray, np.n
     grid = grid[(grid >= times_s[0]) & (grid <= times_s[-1])]
     K, width = len(times_s) - 1, odometry.value.shape[0]
     pose, cov = np.zeros((K, width, 3)), np.zeros((K, width, 3, 3))
-    for a, b in zip(grid[:-1], grid[1:]):
+    for a, b in itertools.pairwise(grid):
         n = int(np.searchsorted(readings, b, side="left"))
         if n == readings.size or b <= begins[n]:
             continue
@@ -367,7 +370,9 @@ def _fixed_chain(log: VehicleLog, breakpoints_s: np.ndarray, trials: int) -> Cha
         for n, time in enumerate(log.fixes.time_s):
             if breakpoints_s[0] <= time <= breakpoints_s[-1]:
                 k = max(int(np.searchsorted(breakpoints_s, time, side="left")) - 1, 0)
-                steps[k] = compose(steps[k].at(np.zeros(2)), measurement(np.eye(2), log.fixes.cov[n], log.fixes.value[:, n]))
+                steps[k] = compose(
+                    steps[k].at(np.zeros(2)), measurement(np.eye(2), log.fixes.cov[n], log.fixes.value[:, n])
+                )
     mean = np.broadcast_to(log.initial.position_m, (trials, 2)).copy()
     cov = np.broadcast_to(log.initial.position_cov, (trials, 2, 2)).copy()
     return Chain(breakpoints_s, Moments(mean, cov), steps)

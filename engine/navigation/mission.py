@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +26,15 @@ class Launch:
 
 @dataclass(frozen=True)
 class Arrival:
-    """Broadcast `index` reaches `vehicle`: slant_m (trials,) is NaN where nothing was heard; depth_m its own."""
+    """Broadcast `index` of `sender` reaches `vehicle`: slant_m (trials,), NaN where not heard; depth_m its own.
+
+    Who sends when is the schedule's, known to all; `last` marks the broadcast's last possible arrival.
+    """
 
     time_s: float
     index: int
     vehicle: int
+    sender: int
     slant_m: np.ndarray
     depth_m: np.ndarray
     last: bool
@@ -48,11 +53,15 @@ Event = Launch | Arrival | Report
 
 @dataclass(frozen=True)
 class NavigationMission:
-    """One block of trials: its log, a chain per vehicle, and the events in order of time."""
+    """One block of trials: its log, a chain per vehicle, and the events in order of time.
+
+    options {algorithm: {name: value}} is what the scenario asks of single algorithms.
+    """
 
     log: Log
     chains: tuple[Chain, ...]
     events: tuple[Event, ...]
+    options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def time_s(self) -> np.ndarray:
@@ -67,7 +76,7 @@ class NavigationMission:
         return self.log.trials
 
 
-def prepare(log: Log) -> NavigationMission:
+def prepare(log: Log, options: Mapping[str, Mapping[str, Any]] | None = None) -> NavigationMission:
     """Compress every vehicle's log between the instants that concern it, and order the channel's events.
 
     At one instant, what was heard counts before what is said, and both before the report.
@@ -82,7 +91,8 @@ def prepare(log: Log) -> NavigationMission:
         depth = depth_at(vehicle, acoustics.toa_s[mine])
         for n, r in enumerate(mine):
             b = int(acoustics.broadcast[r])
-            arrival = Arrival(float(acoustics.toa_s[r]), b, v, slant[:, r], depth[:, n], last[b] == r)
+            sender = int(acoustics.sender[b])
+            arrival = Arrival(float(acoustics.toa_s[r]), b, v, sender, slant[:, r], depth[:, n], last[b] == r)
             events.append((arrival.time_s, 0, int(r), arrival))
         mine = np.flatnonzero(acoustics.sender == v)
         depth = depth_at(vehicle, acoustics.tol_s[mine])
@@ -97,14 +107,14 @@ def prepare(log: Log) -> NavigationMission:
     for v, vehicle in enumerate(log.vehicles):
         own = [e.time_s for e in ordered if isinstance(e, Report) or e.vehicle == v]
         chains.append(chain(vehicle, np.unique(np.concatenate([[0.0], own])), log.trials))
-    return NavigationMission(log, tuple(chains), ordered)
+    return NavigationMission(log, tuple(chains), ordered, options or {})
 
 
 def fly_navigation(scenario, trials: Sequence[int]) -> NavigationMission:
     """Simulate or read a navigation scenario's mission for the given trial numbers and prepare it."""
     from engine.mission import fly
 
-    return prepare(fly(scenario, trials))
+    return prepare(fly(scenario, trials), scenario.options)
 
 
 def outline(mission: NavigationMission) -> Outline:
@@ -113,14 +123,13 @@ def outline(mission: NavigationMission) -> Outline:
     names = [v.name for v in log.vehicles]
     events: list[dict] = []
     tol = {e.index: e.time_s for e in mission.events if isinstance(e, Launch)}
-    sender = {e.index: e.vehicle for e in mission.events if isinstance(e, Launch)}
     for e in mission.events:
         if isinstance(e, Arrival):
             heard = bool(np.isfinite(e.slant_m[0]))
             events.append(
                 {
                     "kind": "packet",
-                    "from": names[sender[e.index]],
+                    "from": names[e.sender],
                     "to": names[e.vehicle],
                     "tol_s": tol[e.index],
                     "toa_s": e.time_s,
@@ -132,5 +141,7 @@ def outline(mission: NavigationMission) -> Outline:
             _, first = np.unique(np.floor(v.fixes.time_s), return_index=True)
             events += [{"kind": "fix", "subject": v.name, "time_s": float(t)} for t in v.fixes.time_s[first]]
     events.sort(key=lambda e: e.get("toa_s", e.get("time_s")))
-    subjects = [{"name": v.name, "kind": v.kind, "depth_m": float(depth_at(v, np.zeros(1))[0, 0])} for v in log.vehicles]
+    subjects = [
+        {"name": v.name, "kind": v.kind, "depth_m": float(depth_at(v, np.zeros(1))[0, 0])} for v in log.vehicles
+    ]
     return Outline(subjects, events)

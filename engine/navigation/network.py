@@ -25,12 +25,16 @@ from engine.tracks import Belief, Innovations, PacketCount, Series, Tracks
 
 @dataclass(frozen=True)
 class Member:
-    """What a node knows of its own vehicle and of the network before the mission."""
+    """What a node knows of its own vehicle and of the network before the mission.
+
+    names and sizes are every vehicle's name and number of states (2: a fixed node, 3: a pose, 4: x, y, vx, vy).
+    """
 
     index: int
     log: VehicleLog
     initial: Moments
     names: tuple[str, ...]
+    sizes: tuple[int, ...]
     trials: int
     sound_speed_mps: float
     sound_speed_sigma_mps: float
@@ -89,12 +93,14 @@ def members(mission: NavigationMission) -> list[Member]:
     """Every vehicle's own knowledge at the start."""
     log = mission.log
     names = tuple(v.name for v in log.vehicles)
+    sizes = tuple(chain.initial.mean.shape[-1] for chain in mission.chains)
     return [
         Member(
             i,
             v,
             mission.chains[i].initial,
             names,
+            sizes,
             log.trials,
             log.sound_speed_mps,
             log.sound_speed_sigma_mps,
@@ -104,9 +110,17 @@ def members(mission: NavigationMission) -> list[Member]:
     ]
 
 
-def run_nodes(mission: NavigationMission, progress: Progress, make: Callable[[Member], Node]) -> Tracks:
-    """Run one node per vehicle over the mission's events."""
-    nodes = [make(member) for member in members(mission)]
+def run_nodes(
+    mission: NavigationMission,
+    progress: Progress,
+    make: Callable[[Member], Any],
+    monitor: Callable[[Any], dict[str, np.ndarray]] | None = None,
+) -> Tracks:
+    """Run one node per vehicle over the mission's events.
+
+    `monitor` names further curves of a node to keep, (trials,) each, by "what/vehicle".
+    """
+    nodes: list[Node] = [make(member) for member in members(mission)]
     counts: list[PacketCount] = []
     in_flight: dict[int, np.ndarray] = {}
 
@@ -127,13 +141,16 @@ def run_nodes(mission: NavigationMission, progress: Progress, make: Callable[[Me
         counts.append(PacketCount(received=int(heard.sum())))
         return nodes[event.vehicle].receive(event, np.where(heard[:, None], data, 0).astype(np.uint8))
 
+    def curves() -> dict[str, np.ndarray]:
+        return {k: v for node in nodes for k, v in monitor(node).items()} if monitor else {}
+
     recorder = _Recorder(mission, progress)
     recorder.drive(
         advance=lambda v, step: nodes[v].advance(step),
         launch=launch,
         receive=receive,
         belief=lambda v: nodes[v].belief(),
-        pairs=lambda: {},
+        curves=curves,
     )
     notes = [f"{m.log.name}: {n}" for m, node in zip(members(mission), nodes) for n in node.notes()]
     return recorder.tracks(sum(counts, PacketCount()), notes)
@@ -145,11 +162,14 @@ def run_fleet(mission: NavigationMission, progress: Progress, make: Callable[[li
     fleet = make(everyone)
     moving = [m.index for m in everyone if m.log.kind != "fixed"]
 
-    def pairs() -> dict[tuple[int, int], np.ndarray]:
-        return {(i, j): fleet.correlation(i, j) for n, i in enumerate(moving) for j in moving[n + 1 :]}
+    names = everyone[0].names
+
+    def curves() -> dict[str, np.ndarray]:
+        pairs = [(i, j) for n, i in enumerate(moving) for j in moving[n + 1 :]]
+        return {f"correlation/{names[i]}~{names[j]}": fleet.correlation(i, j) for i, j in pairs}
 
     recorder = _Recorder(mission, progress)
-    recorder.drive(fleet.advance, fleet.launch, fleet.receive, fleet.belief, pairs)
+    recorder.drive(fleet.advance, fleet.launch, fleet.receive, fleet.belief, curves)
     return recorder.tracks(PacketCount(), fleet.notes())
 
 
@@ -162,7 +182,7 @@ class _Recorder:
         V, T = len(log.vehicles), len(log.time_s)
         self.mean = np.empty((V, log.trials, T, 2))
         self.cov = np.empty((V, log.trials, T, 2, 2))
-        self.correlation: dict[tuple[int, int], np.ndarray] = {}
+        self.curves: dict[str, np.ndarray] = {}
         self.innovations: list[list[tuple[float, Innovation]]] = [[] for _ in range(V)]
         self.started = time.process_time()
 
@@ -172,7 +192,7 @@ class _Recorder:
         launch: Callable[[Launch], None],
         receive: Callable[[Arrival], Innovation | None],
         belief: Callable[[int], Moments],
-        pairs: Callable[[], dict[tuple[int, int], np.ndarray]],
+        curves: Callable[[], dict[str, np.ndarray]],
     ) -> None:
         mission = self.mission
         at = [0] * len(mission.chains)
@@ -191,8 +211,8 @@ class _Recorder:
                     catch_up(v, event.time_s)
                     now = belief(v)
                     self.mean[v, :, event.index], self.cov[v, :, event.index] = now.mean, now.cov
-                for pair, value in pairs().items():
-                    self.correlation.setdefault(pair, np.zeros((mission.trials, T)))[:, event.index] = value
+                for name, value in curves().items():
+                    self.curves.setdefault(name, np.zeros((mission.trials, T)))[:, event.index] = value
                 stream.tick(event.index + 1, T)
                 continue
             catch_up(event.vehicle, event.time_s)
@@ -215,12 +235,7 @@ class _Recorder:
             for v, seen in enumerate(self.innovations)
             if seen
         }
-        series = {
-            f"correlation/{names[i]}~{names[j]}": Series(
-                f"Correlation of {names[i]} and {names[j]}", "1", value, (names[i], names[j])
-            )
-            for (i, j), value in self.correlation.items()
-        }
+        series = {name: _series(name, value) for name, value in self.curves.items()}
         return Tracks(
             beliefs={name: Belief(self.mean[v], self.cov[v]) for v, name in enumerate(names)},
             packets=packets,
@@ -229,6 +244,14 @@ class _Recorder:
             notes=tuple(notes),
             cpu_s=time.process_time() - self.started,
         )
+
+
+def _series(name: str, value: np.ndarray) -> Series:
+    """A curve named "what/subject" or "what/subject~subject"; all of them are coefficients so far."""
+    what, _, whom = name.partition("/")
+    subjects = tuple(whom.split("~"))
+    title = f"{what.replace('_', ' ').capitalize()} of {' and '.join(subjects)}"
+    return Series(title, "1", value, subjects)
 
 
 class _Stream:

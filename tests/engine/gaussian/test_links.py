@@ -67,7 +67,9 @@ def test_a_chain_of_links_equals_filterpy_step_by_step(schedule):
     scale = np.sqrt(np.diag(judge.P))
     for got in (ours, whole):
         np.testing.assert_allclose(got.mean, judge.x[:, 0], rtol=1e-9, atol=1e-9 * (scale.max() + abs(judge.x).max()))
-        np.testing.assert_allclose(got.cov / np.outer(scale, scale), judge.P / np.outer(scale, scale), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            got.cov / np.outer(scale, scale), judge.P / np.outer(scale, scale), rtol=0, atol=1e-9
+        )
         np.linalg.cholesky(got.cov)
         np.testing.assert_array_equal(got.cov, got.cov.T)
 
