@@ -162,6 +162,11 @@ class PositionServer:
         )
 
 
+def make_server(initial: Moments, delayed_state: str) -> FullServer | PositionServer:
+    """The server that keeps "full" or "xy" launch states."""
+    return FullServer(initial) if delayed_state == "full" else PositionServer(initial)
+
+
 def from_nothing(state: Moments) -> Link:
     """A link that forgets its start and ends in the given belief: the first delta of all."""
     zero = np.zeros_like(state.cov)
@@ -179,7 +184,7 @@ class DeifNode:
 
     def __init__(self, member: Member, options: Options) -> None:
         self.member, self.options = member, options
-        self.server = (FullServer if options.delayed_state == "full" else PositionServer)(member.initial)
+        self.server = make_server(member.initial, options.delayed_state)
         self.client = ServedFilter(member)
         self.sequence = 0
         self.recent: list[np.ndarray] = []

@@ -11,24 +11,31 @@ its clients acknowledged. A packet whose step cannot be recovered is skipped: on
 become the origin the next packet connects to it directly, without any difference of informations. A server that
 nobody ever acknowledges resets its origin when the correlation is gone; its clients then begin again from their
 own sensors alone, since what they know can no longer be related to it.
+
+A velocity is forgotten within seconds of Doppler readings, so nothing of it survives in the correlation with an
+origin several launches back, and the recovery would be of rank two: launch states are positions by default, as in
+W11's packet of 14 floats. Full states can be had; then only the launch acknowledged last can be stepped from.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from engine.gaussian.forms import Information, Moments, apply, augment, drop, keep, symmetric, transpose
-from engine.gaussian.links import Link, advance, from_delta, move, update
+from engine.gaussian.links import Link, from_delta, move, update
 from engine.navigation import packets
 from engine.navigation.chains import XY, Step
-from engine.navigation.deif import from_nothing
-from engine.navigation.mission import Arrival, Launch
+from engine.navigation.deif import floats_of, from_nothing, make_server
+from engine.navigation.mission import Arrival, Launch, NavigationMission
 from engine.navigation.network import Member, Packet, correlation_of, run_nodes, slant_to_horizontal
 from engine.navigation.ranging import Innovation
 from engine.navigation.served import ServedFilter
-from engine.registry import Algorithm
+from engine.registry import Algorithm, Progress
+from engine.tracks import Tracks
 
 #: A server nobody acknowledges resets its origin below this correlation.
 DEAD_CORRELATION = 1e-4
@@ -130,22 +137,27 @@ def _safe_information(moments: Moments) -> Information:
     return Information(apply(matrix, moments.mean), matrix)
 
 
-class OriginServer:
-    """The own sensors alone: current state, launch states still of use, and the origin of each trial."""
+class Options(BaseModel):
+    """What a scenario may choose for the MDEIF, under [options.mdeif]."""
 
-    def __init__(self, initial: Moments) -> None:
-        self.joint = initial
-        self.n = initial.mean.shape[-1]
-        self.current = slice(0, self.n)
+    model_config = ConfigDict(extra="forbid")
+
+    delayed_state: Literal["full", "xy"] = Field("xy", description="state kept of a launch; xy is W11's 14 floats")
+
+
+class OriginServer:
+    """The own sensors alone: launch states still of use, joined by the DEIF's deltas, and each trial's origin."""
+
+    def __init__(self, initial: Moments, delayed_state: str) -> None:
+        self.source = make_server(initial, delayed_state)
+        self.n = self.source.size
+        self.joint = keep(initial, slice(0, 0))
         self.launches: list[int] = []
         trials = initial.mean.shape[0]
         self.origin = np.zeros(trials, int)
         self.acknowledged: dict[int, np.ndarray] = {}
         self.correlation = np.ones(trials)
         self.resets = np.zeros(trials, int)
-
-    def advance(self, step: Step) -> None:
-        self.joint = advance(self.joint, self.current, step.at(self.joint.mean[..., self.current]))
 
     def acknowledge(self, client: int, launch: np.ndarray) -> None:
         """A client says which launch it integrated last, per trial (-1: says nothing)."""
@@ -154,9 +166,15 @@ class OriginServer:
         best[known] = np.maximum(best, launch)[known]
 
     def marginal(self, sequence: int) -> Moments:
-        """Augment by the launch `sequence` and return the joint marginal of it and each trial's origin."""
+        """Add the launch `sequence` to the graph and return the joint marginal of it and each trial's origin."""
         self._shift(sequence)
-        self.joint = augment(self.joint, self.current)
+        link, end = self.source.delta(), self.joint.mean.shape[-1]
+        if self.launches:
+            last = slice(end - self.n, end)
+            longer = augment(update(self.joint, last, link.eta, link.J), last)
+            self.joint = move(longer, slice(end, end + self.n), link.A, link.b, link.C)
+        else:
+            self.joint = Moments(link.b, link.C)
         self.launches.append(sequence)
         pair = self._pair(sequence)
         self.correlation = correlation_of(pair, XY, slice(self.n, self.n + 2))
@@ -185,10 +203,8 @@ class OriginServer:
     def _pair(self, sequence: int) -> Moments:
         n, trials = self.n, np.arange(len(self.origin))[:, None]
         where = np.searchsorted(self.launches, self.origin)
-        new = n * (1 + self.launches.index(sequence)) + np.arange(n)
-        index = np.concatenate(
-            [np.broadcast_to(new, (len(trials), n)), n * (1 + where)[:, None] + np.arange(n)], axis=-1
-        )
+        new = n * self.launches.index(sequence) + np.arange(n)
+        index = np.concatenate([np.broadcast_to(new, (len(trials), n)), n * where[:, None] + np.arange(n)], axis=-1)
         mean = self.joint.mean[trials, index]
         cov = self.joint.cov[trials[..., None], index[:, :, None], index[:, None, :]]
         return Moments(mean, cov)
@@ -200,7 +216,7 @@ class OriginServer:
         spare = [k for k in self.launches[:-1] if k not in needed and k not in useless]
         useless += spare[: max(0, len(self.launches) - len(useless) - SERVER_KEEPS)]
         for launch in useless:
-            at = self.n * (1 + self.launches.index(launch))
+            at = self.n * self.launches.index(launch)
             self.joint = drop(self.joint, slice(at, at + self.n))
             self.launches.remove(launch)
 
@@ -284,9 +300,9 @@ class Remembered:
 class MdeifNode:
     """A server of origin state packets and a client of everyone heard."""
 
-    def __init__(self, member: Member) -> None:
-        self.member = member
-        self.server = OriginServer(member.initial)
+    def __init__(self, member: Member, options: Options) -> None:
+        self.member, self.options = member, options
+        self.server = OriginServer(member.initial, options.delayed_state)
         self.client = ServedFilter(member)
         self.sequence = 0
         self.graphs: dict[int, Remembered] = {}
@@ -294,7 +310,7 @@ class MdeifNode:
         self.restarted: dict[int, np.ndarray] = {}
 
     def advance(self, step: Step) -> None:
-        self.server.advance(step)
+        self.server.source.advance(step)
         self.client.advance(step)
 
     def transmit(self, launch: Launch) -> Packet:
@@ -316,12 +332,12 @@ class MdeifNode:
             depth=packets.to_steps(launch.depth_m, packets.DEPTH_STEP_M, "<i2"),
         )
         self.sequence += 1
-        return Packet(data, 1 + 2 * n + n * (2 * n + 1))
+        return Packet(data, 1 + floats_of(n))
 
     def receive(self, arrival: Arrival, data: np.ndarray) -> Innovation:
         """Recover the step from the last launch had, add it, update with the range (W12 section 4.4)."""
         sender, trials = arrival.sender, self.member.trials
-        n = self.member.sizes[sender]
+        n = 2 if self.options.delayed_state == "xy" else self.member.sizes[sender]
         packet = packets.decode(packet_layout(n, len(self.member.names)), data)
         record = packet.record
         graph = self.graphs.setdefault(sender, Remembered.nothing(trials, n))
@@ -339,7 +355,8 @@ class MdeifNode:
                 other.forget(again)
             self.restarted[sender] = self.restarted.get(sender, np.zeros(trials, int)) + again
         begun = valid & (graph.last < 0)
-        link, stepped = self._step(graph, s, origin, valid & ~begun)
+        fixed = self.member.sizes[sender] == 2
+        link, stepped = self._step(graph, s, origin, valid & ~begun, fixed)
         self.skipped[sender] = self.skipped.get(sender, np.zeros(trials, int)) + (valid & ~begun & ~stepped)
         start = from_nothing(keep(s, slice(0, n)))
         self.client.integrate(sender, _where(begun, start, link), begun | stepped)
@@ -349,11 +366,13 @@ class MdeifNode:
         range_m = slant_to_horizontal(arrival, record["depth"] * packets.DEPTH_STEP_M)
         return self.client.update(sender, np.where(usable, range_m, np.nan))
 
-    def _step(self, graph: Remembered, s: Moments, origin: np.ndarray, valid: np.ndarray) -> tuple[Link, np.ndarray]:
+    def _step(
+        self, graph: Remembered, s: Moments, origin: np.ndarray, valid: np.ndarray, fixed: bool
+    ) -> tuple[Link, np.ndarray]:
         """The link from the last launch integrated to the packet's, and in which of the valid trials it is known."""
         n = s.mean.shape[-1] // 2
         newest = graph.slot(graph.last)
-        if n == 2:
+        if fixed:
             # A node that does not move has one state, whatever the origin.
             same = Moments(np.tile(s.mean[:, :n], 2), np.tile(s.cov[:, :n, :n], (1, 2, 2)))
             return direct_step(_harmless(graph.pick(newest), valid), _harmless(same, valid)), valid
@@ -424,12 +443,18 @@ def _where(mask: np.ndarray, one: Link, other: Link) -> Link:
     )
 
 
+def run(mission: NavigationMission, progress: Progress) -> Tracks:
+    """Run the MDEIF on a mission with the scenario's options."""
+    options = Options(**mission.options.get("mdeif", {}))
+    return run_nodes(mission, progress, lambda member: MdeifNode(member, options), MdeifNode.monitor)
+
+
 MDEIF = Algorithm(
     name="mdeif",
     title="Origin state method (MDEIF)",
     family="navigation",
     summary="DEIF whose packets refer to an acknowledged origin state: a lost packet costs only its own range.",
     source="Walls and Eustice 2012",
-    run=lambda mission, progress: run_nodes(mission, progress, MdeifNode, MdeifNode.monitor),
+    run=run,
     assumes=("clients answer now and then, to move the origin",),
 )

@@ -23,7 +23,7 @@ def layout(*fields: tuple) -> np.dtype:
 
 @dataclass(frozen=True)
 class Decoded:
-    """Records (trials,) as received, and which of them are valid."""
+    """Records (trials,) as received, blank where not valid."""
 
     record: np.ndarray
     valid: np.ndarray
@@ -45,8 +45,10 @@ def decode(dtype: np.dtype, data: np.ndarray) -> Decoded:
     if data.ndim != 2 or data.shape[1] != dtype.itemsize:
         return Decoded(np.zeros(trials, dtype), np.zeros(trials, bool))
     data = np.ascontiguousarray(data)
-    record = data.view(dtype)[:, 0]
-    return Decoded(record, crc16(data[:, :-2]) == record["checksum"])
+    record = data.view(dtype)[:, 0].copy()
+    valid = crc16(data[:, :-2]) == record["checksum"]
+    record[~valid] = np.zeros((), dtype)
+    return Decoded(record, valid)
 
 
 def _crc_table() -> np.ndarray:

@@ -29,14 +29,14 @@ def make_log(
     duration_s: float = 600.0,
     period_s: float = 15.0,
     fixed_by_gps: Sequence[int] = (0,),
-    loss: float = 0.0,
+    loss: float | dict[int, float] = 0.0,
     range_sigma_m: float = 1.0,
     report_s: float = 10.0,
     silent_s: tuple[float, float] | None = None,
 ) -> Log:
     """Vehicles take turns to broadcast; `links` (from, to) says who hears whom.
 
-    silent_s: an interval in which nothing is heard by anybody.
+    loss: the part of receptions lost, for all or by sender; silent_s: an interval in which nothing is heard by anybody.
     """
     rng = np.random.default_rng(seed)
     logs = []
@@ -67,7 +67,9 @@ def make_log(
                 range_sigma_m=range_sigma_m,
                 velocity=None
                 if gps
-                else Velocity(time, body + rng.normal(size=body.shape) * 0.05, along_sigma_mps=0.05, cross_sigma_mps=0.05),
+                else Velocity(
+                    time, body + rng.normal(size=body.shape) * 0.05, along_sigma_mps=0.05, cross_sigma_mps=0.05
+                ),
                 heading=None
                 if gps
                 else Heading(time, heading + rng.normal(size=(trials, len(time))) * HEADING_SIGMA, HEADING_SIGMA),
@@ -102,8 +104,9 @@ def _acoustics(rng, links, vehicles, trials, duration_s, period_s, loss, sigma, 
                 distance = float(np.linalg.norm(path(receiver, np.array([toa])) - path(s, np.array([t]))))
                 toa = t + distance / C
             travel = toa - t + rng.normal(size=trials) * sigma / C
+            rate = loss[int(s)] if isinstance(loss, dict) else loss
             silent = silent_s is not None and silent_s[0] <= t <= silent_s[1]
-            travel[(rng.random(trials) < loss) | silent] = np.nan
+            travel[(rng.random(trials) < rate) | silent] = np.nan
             rows.append((toa, b, receiver, travel))
     rows.sort(key=lambda r: r[0])
     return AcousticLog(
