@@ -134,6 +134,10 @@ class PositionServer:
         self.last = slice(self.current.stop, self.current.stop + 2)
         self.known: Moments | None = None
 
+    @property
+    def state(self) -> Moments:
+        return keep(self.joint, self.current)
+
     def advance(self, step: Step) -> None:
         self.joint = advance(self.joint, self.current, step.at(self.joint.mean[..., self.current]))
 

@@ -245,13 +245,7 @@ class Remembered:
 
     def pick(self, *slots: np.ndarray) -> Moments:
         """Joint moments of the given slots (trials,) each, in that order."""
-        trials = np.arange(len(self.last))[:, None]
-        n = self.state.mean.shape[-1] // CLIENT_KEEPS
-        index = np.concatenate([np.maximum(s, 0)[:, None] * n + np.arange(n) for s in slots], axis=-1)
-        return Moments(
-            self.state.mean[trials, index],
-            self.state.cov[trials[..., None], index[:, :, None], index[:, None, :]],
-        )
+        return _picked(self.state, *slots)
 
     def begin(self, s: Moments, sequence: np.ndarray, origin: np.ndarray, where: np.ndarray) -> None:
         """Start from one packet, the joint of (new, origin), in the trials of a mask; forget all before."""
@@ -274,27 +268,34 @@ class Remembered:
         The origin now in use is kept however old it is.
         """
         n = self.state.mean.shape[-1] // CLIENT_KEEPS
-        rows, size = np.flatnonzero(where), self.state.mean.shape[-1]
+        n = self.state.mean.shape[-1] // CLIENT_KEEPS
         age = np.where(self.sequence == origin[:, None], np.iinfo(np.int64).max, self.sequence)
         age = np.where(self.sequence == self.last[:, None], np.iinfo(np.int64).max, age)
-        target = age.argmin(-1)
-        source = np.maximum(self.slot(self.last), 0)
-        for k in range(CLIENT_KEEPS):
-            for j in range(CLIENT_KEEPS):
-                mine = rows[(target[rows] == k) & (source[rows] == j)]
-                if not mine.size:
-                    continue
-                part = Moments(self.state.mean[mine], self.state.cov[mine])
-                here = Link(*(getattr(link, f)[mine] for f in ("A", "b", "C", "eta", "J")))
-                block, old = slice(k * n, k * n + n), slice(j * n, j * n + n)
-                longer = augment(update(part, old, here.eta, here.J), old)
-                longer = move(longer, slice(size, size + n), here.A, here.b, here.C)
-                order = np.arange(size)
-                order[block] = size + np.arange(n)
-                self.state.mean[mine] = longer.mean[:, order]
-                self.state.cov[mine] = longer.cov[:, order[:, None], order]
-        self.sequence[rows, target[rows]] = sequence[rows]
-        self.last[rows] = sequence[rows]
+        target, source = age.argmin(-1), np.maximum(self.slot(self.last), 0)
+        # Sort the slots per trial: the last launch first, the one to be overwritten at the end.
+        rank = np.broadcast_to(np.arange(CLIENT_KEEPS), self.sequence.shape).copy()
+        np.put_along_axis(rank, source[:, None], -1, -1)
+        np.put_along_axis(rank, target[:, None], CLIENT_KEEPS, -1)
+        order = np.argsort(rank, axis=-1)
+        sorted_state = self.pick(*order.T)
+        kept, newest = slice(0, (CLIENT_KEEPS - 1) * n), slice(0, n)
+        longer = augment(update(keep(sorted_state, kept), newest, link.eta, link.J), newest)
+        longer = move(longer, slice(kept.stop, kept.stop + n), link.A, link.b, link.C)
+        back = _picked(longer, *np.argsort(order, axis=-1).T)
+        self.state = Moments(
+            np.where(where[:, None], back.mean, self.state.mean),
+            np.where(where[:, None, None], back.cov, self.state.cov),
+        )
+        self.sequence[where, target[where]] = sequence[where]
+        self.last[where] = sequence[where]
+
+
+def _picked(state: Moments, *slots: np.ndarray) -> Moments:
+    """Joint moments of the given slots (trials,) each, in that order."""
+    n = state.mean.shape[-1] // CLIENT_KEEPS
+    trials = np.arange(state.mean.shape[0])[:, None]
+    index = np.concatenate([np.maximum(s, 0)[:, None] * n + np.arange(n) for s in slots], axis=-1)
+    return Moments(state.mean[trials, index], state.cov[trials[..., None], index[:, :, None], index[:, None, :]])
 
 
 class MdeifNode:
@@ -350,7 +351,7 @@ class MdeifNode:
         valid &= sequence > graph.last
         again = valid & (origin == sequence) & (graph.last >= 0)
         if again.any():
-            self.client.start_again(again)
+            self.client.start_again(again, self.server.source.state)
             for other in self.graphs.values():
                 other.forget(again)
             self.restarted[sender] = self.restarted.get(sender, np.zeros(trials, int)) + again

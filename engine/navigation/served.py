@@ -25,14 +25,11 @@ class ServedFilter:
         self.member = member
         self.own = slice(0, member.initial.mean.shape[-1])
         self.joint, self.scale = with_sound_speed(member.initial, member)
-        #: The own sensors alone: what is left when nothing that was heard can be trusted any more.
-        self.alone = member.initial
         self.servers: dict[int, slice] = {}
 
     def advance(self, step: Step) -> None:
         """Move on by a step of the own local log."""
         self.joint = advance(self.joint, self.own, step.at(self.joint.mean[..., self.own]))
-        self.alone = advance(self.alone, slice(None), step.at(self.alone.mean))
 
     def server(self, sender: int, size: int) -> slice:
         """The block of a server, made at its first packet as a placeholder that no estimate depends on."""
@@ -63,20 +60,15 @@ class ServedFilter:
         )
         return seen
 
-    def start_again(self, trials: np.ndarray) -> None:
-        """Forget, in the given trials, everything heard: back to the own sensors alone, servers unknown."""
+    def start_again(self, trials: np.ndarray, alone: Moments) -> None:
+        """Forget, in the trials of a mask, everything heard: `alone` is what the own sensors say by themselves."""
+        fresh, _ = with_sound_speed(alone, self.member)
+        n, known = self.joint.mean.shape[-1], fresh.mean.shape[-1]
         mean, cov = self.joint.mean.copy(), self.joint.cov.copy()
-        n = self.own.stop
-        fresh, self_scale = with_sound_speed(self.alone, self.member)
-        size = fresh.mean.shape[-1]
-        blank_mean = np.zeros_like(mean)
-        blank_cov = np.broadcast_to(np.eye(mean.shape[-1]), cov.shape).copy()
-        blank_mean[:, :size] = fresh.mean
-        blank_cov[:, :size, :size] = fresh.cov
-        assert n <= size and self_scale == self.scale
-        self.joint = Moments(
-            np.where(trials[:, None], blank_mean, mean), np.where(trials[:, None, None], blank_cov, cov)
-        )
+        mean[trials], cov[trials] = 0.0, np.eye(n)
+        mean[trials, :known] = fresh.mean[trials]
+        cov[trials, :known, :known] = fresh.cov[trials]
+        self.joint = Moments(mean, cov)
 
     def belief(self) -> Moments:
         """Own position belief."""
