@@ -1,0 +1,10 @@
+"""Which model reads which family's scenarios; a new family adds its file and its line."""
+
+from __future__ import annotations
+
+from engine.scenario.models import ScenarioBase
+from engine.scenario.navigation import NavigationScenario
+
+MODELS: dict[str, type[ScenarioBase]] = {
+    "navigation": NavigationScenario,
+}
