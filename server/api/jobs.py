@@ -1,0 +1,130 @@
+"""Jobs: to submit, to watch, to end, and what came of them."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Response
+from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
+
+from engine.scenario.models import ScenarioBase
+from server import artifacts, report
+from server.inline import from_json, with_values
+from server.problems import Refusal
+from server.shelf import unavailable
+from server.site import Here, Site
+
+router = APIRouter(prefix="/api", tags=["jobs"])
+
+
+class Submission(BaseModel):
+    """What to run: a scenario by name or written out, and what to change in it."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    scenario: str | dict[str, Any]
+    algorithms: list[str] | None = Field(None, max_length=100)
+    trials: int | None = Field(None, ge=1)
+    seed: int | None = Field(None, ge=0)
+    set: dict[str, Any] = Field({}, max_length=200, description="key paths and their values, as in network.loss: 0.4")
+
+
+@router.post("/jobs", status_code=202)
+async def submit(
+    body: Submission,
+    response: Response,
+    here: Here,
+    idempotency_key: Annotated[str | None, Header(max_length=200)] = None,
+) -> dict[str, Any]:
+    """Accept a job; the same Idempotency-Key with the same body answers with the same job."""
+    scenario = await run_in_threadpool(_wanted, body, here)
+    name = body.scenario if isinstance(body.scenario, str) else None
+    job = await here.jobs.submit(scenario, name, body.algorithms, idempotency_key, body.model_dump(mode="json"))
+    response.headers["location"] = f"/api/jobs/{job.id}"
+    return job.public()
+
+
+@router.get("/jobs")
+def jobs(here: Here) -> list[dict[str, Any]]:
+    """The newest 200 jobs, newest first."""
+    return [job.public() for job in here.jobs.store.jobs()]
+
+
+@router.get("/jobs/{id}")
+def job(id: str, here: Here) -> dict[str, Any]:
+    """A job's state."""
+    return here.jobs.find(id).public()
+
+
+@router.delete("/jobs/{id}", status_code=204)
+async def delete(id: str, here: Here) -> None:
+    """Forget a job and its files; one that runs is ended."""
+    await here.jobs.delete(id)
+
+
+@router.post("/jobs/{id}/cancel")
+async def cancel(id: str, here: Here) -> dict[str, Any]:
+    """End a job; one that has ended stays as it is."""
+    return (await here.jobs.cancel(id)).public()
+
+
+@router.get("/jobs/{id}/events", response_class=StreamingResponse)
+async def events(id: str, here: Here, last_event_id: Annotated[str, Header()] = "0") -> StreamingResponse:
+    """Server-sent events: state, progress and estimates; resumable by Last-Event-ID; ends with the job."""
+    here.jobs.find(id)
+    after = int(last_event_id) if last_event_id.isascii() and last_event_id.isdigit() else 0
+    return StreamingResponse(
+        _stream(here, id, min(after, 2**62)),
+        media_type="text/event-stream",
+        headers={"cache-control": "no-store", "x-accel-buffering": "no"},
+    )
+
+
+@router.get("/jobs/{id}/result", response_class=FileResponse)
+def result(id: str, here: Here) -> FileResponse:
+    """result.json of a finished job."""
+    return FileResponse(here.jobs.artifact(id, artifacts.RESULT), media_type="application/json")
+
+
+@router.get("/jobs/{id}/arrays", response_class=FileResponse)
+def arrays(id: str, here: Here) -> FileResponse:
+    """arrays.npz of a finished job."""
+    path = here.jobs.artifact(id, artifacts.ARRAYS)
+    return FileResponse(path, media_type="application/octet-stream", filename=f"{id}-{artifacts.ARRAYS}")
+
+
+@router.get("/jobs/{id}/report", response_class=HTMLResponse)
+def job_report(id: str, here: Here) -> HTMLResponse:
+    """A finished job as one HTML page that needs nothing else."""
+    folder = here.jobs.artifact(id, artifacts.RESULT).parent
+    return HTMLResponse(report.of_directory(folder), headers={"content-security-policy": report.POLICY})
+
+
+@router.get("/jobs/{id}/view")
+def view(id: str, here: Here) -> Response:
+    """A run thinned for display, as far as it has come."""
+    return Response(here.jobs.view(id), media_type="application/json", headers={"cache-control": "no-store"})
+
+
+def _wanted(body: Submission, here: Site) -> ScenarioBase:
+    scenario = here.shelf.find(body.scenario) if isinstance(body.scenario, str) else from_json(body.scenario)
+    scenario = with_values(scenario, body.set)
+    if body.trials is not None:
+        scenario = with_values(scenario, {"trials": body.trials})
+    if body.seed is not None:
+        scenario = with_values(scenario, {"seed": body.seed})
+    missing = unavailable(scenario)
+    if missing is not None:
+        raise Refusal(422, "missing-data", missing)
+    return scenario
+
+
+async def _stream(here: Site, id: str, after: int) -> AsyncIterator[str]:
+    async for event in here.journal.follow(id, after):
+        if event is None:
+            yield ": still here\n\n"
+        else:
+            yield f"id: {event.id}\nevent: {event.kind}\ndata: {event.data}\n\n"

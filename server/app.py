@@ -1,0 +1,71 @@
+"""The server as one ASGI application on one port."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from importlib.metadata import version
+
+from fastapi import FastAPI
+from starlette.middleware.gzip import GZipMiddleware
+
+from server import problems
+from server.api import algorithms, docs, health, jobs, page, scenarios, scenes
+from server.cluster import Cluster
+from server.guard import Guard
+from server.jobs import Jobs
+from server.journal import Journal
+from server.scenes.sessions import Sessions
+from server.settings import Settings
+from server.shelf import Shelf
+from server.site import Site
+from server.store import Store
+from server.wire import Json
+
+DESCRIPTION = """Compare cooperative underwater navigation estimators. Errors are problem+json
+(type, title, status, detail, and the key paths of input at fault)."""
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """The application; its store, cluster and scenes live from start-up to shutdown."""
+
+    @contextlib.asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        settings.data.mkdir(parents=True, exist_ok=True)
+        store = Store(settings.data / "coopnav.sqlite")
+        journal = Journal(store)
+        cluster = Cluster(settings)
+        work = Jobs(store, journal, cluster, settings)
+        scenes = Sessions(settings, work)
+        shelf = Shelf(settings.data / "scenarios")
+        app.state.site = Site(settings, journal, cluster, work, shelf, scenes)
+        starting = asyncio.create_task(cluster.start(work.hear))
+        work.start()
+        try:
+            yield
+        finally:
+            journal.close()
+            await scenes.close()
+            await work.close()
+            await asyncio.gather(starting, return_exceptions=True)
+            await journal.flush()
+            await cluster.close()
+            store.close()
+
+    app = FastAPI(
+        title="coopnav",
+        version=version("coopnav"),
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+        default_response_class=Json,
+    )
+    problems.install(app)
+    for room in (health, algorithms, scenarios, jobs, scenes, docs, page):
+        app.include_router(room.router)
+    app.add_middleware(GZipMiddleware, minimum_size=2000, compresslevel=5)
+    app.add_middleware(Guard, settings=settings)
+    return app

@@ -1,0 +1,125 @@
+"""Files written whole: a result directory, and the files of finished shards."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib import metadata
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from engine.evaluation.result import Result
+from engine.runner import Shard
+from engine.tracks import Belief, Innovations, PacketCount, Reference, Samples, Series, Tracks
+from server.wire import plain
+
+RESULT, ARRAYS, VERSIONS = "result.json", "arrays.npz", "versions.json"
+
+
+def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file so that it is there completely, even after a power cut, or not at all."""
+    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole."""
+    write_whole(path, lambda file: file.write(text.encode()))
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a JSON file whole; NaN becomes null."""
+    write_text(path, json.dumps(plain(value), allow_nan=False, ensure_ascii=False, indent=1) + "\n")
+
+
+def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write named arrays as npz whole."""
+    write_whole(path, lambda file: np.savez(file, allow_pickle=False, **arrays))  # pyright: ignore[reportArgumentType]
+
+
+def versions() -> dict[str, str]:
+    """The software that computes results here."""
+    found = {name: metadata.version(name) for name in ("coopnav", "numpy", "scipy")}
+    return found | {"python": platform.python_version()}
+
+
+def write_result(directory: Path, result: Result) -> None:
+    """Write result.json and arrays.npz into a directory, and what computed them; result.json last."""
+    directory.mkdir(parents=True, exist_ok=True)
+    write_json(directory / VERSIONS, versions())
+    write_arrays(directory / ARRAYS, result.arrays())
+    write_json(directory / RESULT, result.to_json())
+
+
+def write_shard(path: Path, shard: Shard, reference: Reference, tracks: Tracks) -> None:
+    """Write a finished shard: its answer and the truth of its trials."""
+    arrays: dict[str, np.ndarray] = {"time_s": reference.time_s}
+    meta: dict[str, Any] = {
+        "algorithm": shard.algorithm,
+        "trials": list(shard.trials),
+        "truth": list(reference.truth),
+        "beliefs": list(tracks.beliefs),
+        "samples": list(tracks.samples),
+        "innovations": list(tracks.innovations),
+        "series": [[key, s.title, s.unit, list(s.subjects)] for key, s in tracks.series.items()],
+        "packets": asdict(tracks.packets),
+        "notes": list(tracks.notes),
+        "cpu_s": tracks.cpu_s,
+    }
+    for n, value in enumerate(reference.truth.values()):
+        arrays[f"truth/{n}"] = value
+    for room in ("beliefs", "samples", "innovations"):
+        for n, item in enumerate(getattr(tracks, room).values()):
+            arrays |= {f"{room}/{n}/{name}": value for name, value in vars(item).items()}
+    for n, series in enumerate(tracks.series.values()):
+        arrays[f"series/{n}"] = series.value
+    arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
+    write_arrays(path, arrays)
+
+
+def read_shard(path: Path) -> tuple[Shard, Reference, Tracks]:
+    """Read what `write_shard` wrote."""
+    with np.load(path, allow_pickle=False) as file:
+        arrays = {key: file[key] for key in file.files}
+    meta = json.loads(arrays["meta"].tobytes())
+
+    def items(room: str, kind: Callable[..., Any]) -> dict[str, Any]:
+        return {
+            name: kind(**{k.rsplit("/", 1)[1]: v for k, v in arrays.items() if k.startswith(f"{room}/{n}/")})
+            for n, name in enumerate(meta[room])
+        }
+
+    reference = Reference(arrays["time_s"], {name: arrays[f"truth/{n}"] for n, name in enumerate(meta["truth"])})
+    tracks = Tracks(
+        beliefs=items("beliefs", Belief),
+        packets=PacketCount(**meta["packets"]),
+        samples=items("samples", Samples),
+        innovations=items("innovations", Innovations),
+        series={
+            key: Series(title, unit, arrays[f"series/{n}"], tuple(subjects))
+            for n, (key, title, unit, subjects) in enumerate(meta["series"])
+        },
+        notes=tuple(meta["notes"]),
+        cpu_s=meta["cpu_s"],
+    )
+    return Shard(meta["algorithm"], tuple(meta["trials"])), reference, tracks

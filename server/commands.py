@@ -1,0 +1,204 @@
+"""What the commands of the command line do; each returns the exit code."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from engine import registry, runner
+from engine.evaluation.result import Result
+from engine.scenario import library, toml
+from engine.scenario.models import ScenarioBase
+from server import table
+
+
+class Usage(Exception):
+    """Input that cannot be used, in words for the person at the keyboard."""
+
+
+def serve(chosen: Namespace) -> int:
+    """Serve the dashboard until told to stop."""
+    from server import serving
+    from server.settings import Settings, default_data
+
+    try:
+        serving.serve(
+            Settings(data=chosen.data or default_data(), host=chosen.host, port=chosen.port, cluster=chosen.cluster)
+        )
+    except serving.CannotServe as error:
+        raise Usage(str(error)) from None
+    return 0
+
+
+def run(chosen: Namespace) -> int:
+    """Run a scenario, print the comparison, write the result directory where one is named."""
+    from server import artifacts
+
+    scenario = _wanted(chosen)
+    runner.chosen(scenario, chosen.algorithms)
+    if chosen.out is not None and chosen.out.exists() and not chosen.out.is_dir():
+        raise Usage(f"--out {chosen.out} is a file; name a folder")
+    result = _run(scenario, chosen.algorithms, chosen.workers)
+    print(f"{scenario.title} ({result.trials} trial{'s' * (result.trials != 1)}, seed {result.seed})")
+    told = result.to_json()
+    print("\n".join(table.lines(*table.figures(told))))
+    for name, answer in told["algorithms"].items():
+        for note in answer["notes"]:
+            print(f"note: {name}: {note}")
+    for claim in result.claims:
+        print(_claim(claim))
+    if chosen.out is not None:
+        artifacts.write_result(chosen.out, result)
+        print(f"written to {chosen.out}", file=sys.stderr)
+    return 0
+
+
+def check(chosen: Namespace) -> int:
+    """Run scenarios for their claims; 1 where one fails."""
+    if chosen.all == bool(chosen.scenarios):
+        raise Usage("name the scenarios to check, or give --all")
+    names: Sequence[str] = library.names() if chosen.all else chosen.scenarios
+    scenarios = {name: _find(name) for name in names}
+    failed = 0
+    for name, scenario in scenarios.items():
+        missing = library.missing(scenario)
+        if missing is not None and chosen.all:
+            print(f"{name}: left out, {missing}")
+            continue
+        if not scenario.claims:
+            print(f"{name}: makes no claims")
+            continue
+        print(f"{name}: {scenario.title}")
+        for claim in _run(scenario, None, chosen.workers).claims:
+            print(f"  {_claim(claim)}")
+            failed += claim["holds"] is False
+    print(f"{failed} claim{'s' * (failed != 1)} failed" if failed else "no claim failed")
+    return 1 if failed else 0
+
+
+def log(chosen: Namespace) -> int:
+    """Write the log of a mission's first trial as CSV files with a scenario that reads them."""
+    from engine.mission import csv_log, fly
+
+    scenario = _wanted(chosen)
+    if chosen.out.exists() and not chosen.out.is_dir():
+        raise Usage(f"--out {chosen.out} is a file; name a folder")
+    csv_log.write(fly(scenario, [0]), scenario, chosen.out)
+    print(f"written to {chosen.out}; run it with: coopnav run {chosen.out}")
+    return 0
+
+
+def listing(chosen: Namespace) -> int:
+    """List algorithms or scenarios."""
+    entries = _algorithms() if chosen.what == "algorithms" else _scenarios()
+    if chosen.json:
+        print(json.dumps(entries, indent=1, ensure_ascii=False))
+        return 0
+    columns = ("name", "family", "title")
+    print("\n".join(table.lines(columns, [[str(e[c]) for c in columns] for e in entries], left=3)))
+    return 0
+
+
+def report(chosen: Namespace) -> int:
+    """Write the report of a result directory, or of a job by its id."""
+    from server import artifacts
+    from server.report import of_directory
+    from server.settings import default_data
+
+    folder = Path(chosen.source)
+    if not folder.is_dir() and folder.name == chosen.source:
+        folder = (chosen.data or default_data()) / "jobs" / chosen.source
+    if not (folder / artifacts.RESULT).is_file():
+        raise Usage(f"{chosen.source} is neither a finished job nor a folder with a {artifacts.RESULT}")
+    try:
+        page = of_directory(folder)
+    except (ValueError, KeyError, TypeError) as error:
+        raise Usage(f"{folder} does not hold a result as `coopnav run --out` writes it ({error})") from None
+    artifacts.write_text(chosen.out, page)
+    return 0
+
+
+def _find(name: str) -> ScenarioBase:
+    path = Path(name)
+    if path.is_dir():
+        path = path / "scenario.toml"
+        if not path.is_file():
+            raise Usage(f"there is no scenario.toml in {name}")
+        return toml.load(path)
+    return library.find(name)
+
+
+def _wanted(chosen: Namespace) -> ScenarioBase:
+    changes: dict[str, str] = {}
+    for text in chosen.changes:
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise Usage(f"--set {text}: write it as key=value, for example network.loss=0.4")
+        changes[key.strip()] = value.strip()
+    for key in ("trials", "seed"):
+        if getattr(chosen, key) is not None:
+            changes[key] = getattr(chosen, key)
+    scenario = _find(chosen.scenario)
+    return toml.override(scenario, changes) if changes else scenario
+
+
+def _run(scenario: ScenarioBase, algorithms: Sequence[str] | None, workers: int | None) -> Result:
+    with tqdm(total=100, unit="%", bar_format="{desc}{percentage:3.0f}% |{bar}| {elapsed}", file=sys.stderr) as bar:
+
+        def progress(fraction: float) -> None:
+            bar.update(max(0.0, 100 * fraction - bar.n))
+
+        result = runner.run(scenario, algorithms, workers=workers, progress=progress)
+        bar.update(100 - bar.n)
+    return result
+
+
+def _claim(claim: dict[str, Any]) -> str:
+    verdict = {True: "holds", False: "FAILS", None: "not run"}[claim["holds"]]
+    found = f"{_figure(claim['value'])} {claim['operator']} {_figure(claim['bound'])}"
+    reason = f" ({claim['reason']})" if claim.get("reason") else ""
+    return f"claim {verdict}: {claim['text']} [{found}]{reason}"
+
+
+def _figure(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else "none" if value is None else str(value).lower()
+
+
+def _algorithms() -> list[dict[str, Any]]:
+    return [
+        {
+            "name": a.name,
+            "title": a.title,
+            "family": a.family,
+            "summary": a.summary,
+            "source": a.source,
+            "centralized": a.centralized,
+            "assumes": list(a.assumes),
+        }
+        for a in registry.algorithms().values()
+    ]
+
+
+def _scenarios() -> list[dict[str, Any]]:
+    entries = []
+    for name in library.names():
+        scenario = library.find(name)
+        entries.append(
+            {
+                "name": name,
+                "title": scenario.title,
+                "family": scenario.family,
+                "summary": scenario.summary,
+                "source": scenario.source,
+                "trials": scenario.trials,
+                "algorithms": list(scenario.algorithms),
+                "missing": library.missing(scenario),
+            }
+        )
+    return entries

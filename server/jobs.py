@@ -1,0 +1,345 @@
+"""The life of a job: accepted, split into shards, run, put together; or failed, or cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hashlib
+import json
+import logging
+import math
+import secrets
+import shutil
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from distributed import KilledWorker
+
+from engine import runner
+from engine.runner import Shard
+from engine.scenario import toml
+from engine.scenario.errors import Problem, ScenarioError
+from engine.scenario.models import ScenarioBase
+from server import artifacts, view
+from server.cluster import Cluster
+from server.journal import Journal
+from server.problems import Refusal
+from server.settings import Settings
+from server.store import FINAL, Job, Store
+from server.wire import dumps
+
+log = logging.getLogger(__name__)
+
+OUTLINE, VIEW = "outline.json", "view.json"
+#: Report times assumed when a result's size is estimated before it runs.
+USUAL_TIMES = 800
+#: Progress of a job is told at most this often.
+PROGRESS_S = 0.1
+
+
+def now() -> str:
+    """The time in UTC, ISO 8601 to the millisecond."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+class Jobs:
+    """Runs jobs on a cluster; what it knows for good is in the store and in the data folder."""
+
+    def __init__(self, store: Store, journal: Journal, cluster: Cluster, settings: Settings) -> None:
+        self.store, self.journal = store, journal
+        self._cluster, self._settings = cluster, settings
+        self._folder = settings.data / "jobs"
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._running: dict[str, _Watch] = {}
+
+    def start(self) -> None:
+        """Take up the jobs accepted before a restart; they run once the cluster is ready."""
+        for job in self.store.unfinished():
+            self._begin(job)
+
+    async def close(self) -> None:
+        """Stop working; unfinished jobs stay accepted."""
+        tasks = list(self._tasks.values())
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def submit(
+        self, scenario: ScenarioBase, name: str | None, algorithms: list[str] | None, key: str | None, body: Any
+    ) -> Job:
+        """Accept a job, or find the one accepted before under the same idempotency key.
+
+        Raises ScenarioError for what cannot run, Refusal 409 for a key used with another body.
+        """
+        names = runner.chosen(scenario, algorithms)
+        self._check_size(scenario, names)
+        if len(self._tasks) >= self._settings.most_jobs_waiting:
+            raise Refusal(
+                429,
+                "busy",
+                f"{len(self._tasks)} jobs are waiting already; try again later",
+                headers={"retry-after": "10"},
+            )
+        job = Job(
+            id=secrets.token_hex(8),
+            state="queued",
+            title=scenario.title,
+            scenario=name,
+            family=scenario.family,
+            algorithms=names,
+            trials=scenario.trials,
+            seed=scenario.seed,
+            created_at=now(),
+            toml=toml.dumps(scenario),
+            origin=scenario.origin,
+            idempotency_key=key,
+            digest=hashlib.sha256(json.dumps(body, sort_keys=True).encode()).hexdigest(),
+        )
+        kept, new = await asyncio.to_thread(self.store.add, job)
+        if not new and kept.digest != job.digest:
+            raise Refusal(409, "idempotency", "this Idempotency-Key was used for another job; take a new one")
+        if new:
+            self._begin(kept)
+        return kept
+
+    async def cancel(self, id: str) -> Job:
+        """End a job now; one that has ended stays as it is."""
+        found = self.find(id)
+        if found.state in FINAL:
+            return found
+        await self.journal.flush()
+        changed = await asyncio.to_thread(self.store.change, id, state="cancelled", finished_at=now())
+        self.journal.wake()
+        task = self._tasks.get(id)
+        if changed is not None and task is not None:
+            task.cancel()
+            await self._cluster.cancel(id)
+            await asyncio.gather(task, return_exceptions=True)
+            self._drop_shards(id)
+        return self.find(id)
+
+    async def delete(self, id: str) -> None:
+        """Forget a job and its files, after ending it."""
+        await self.cancel(id)
+        await asyncio.to_thread(self.store.delete, id)
+        self.journal.wake()
+        await asyncio.to_thread(shutil.rmtree, self._folder / id, True)
+
+    def find(self, id: str) -> Job:
+        """The job of an id; Refusal 404 where there is none."""
+        job = self.store.job(id)
+        if job is None:
+            raise Refusal(404, "unknown-job", "there is no such job")
+        return job
+
+    def artifact(self, id: str, name: str) -> Path:
+        """A file of a finished job; Refusal 409 before it is there."""
+        job = self.find(id)
+        if job.state != "done":
+            raise Refusal(409, "not-done", f"the job is {job.state}; it has no result")
+        return self._folder / job.id / name
+
+    def view(self, id: str) -> str:
+        """The view as JSON text: the finished one, or of what there is so far; Refusal 409 before anything."""
+        job = self.find(id)
+        finished = self._folder / job.id / VIEW
+        if job.state == "done":
+            return finished.read_text(encoding="utf-8")
+        parts = self._parts(job)
+        outline = self.outline(id)
+        if outline is None or not parts:
+            raise Refusal(409, "not-yet", f"the job is {job.state}; there is nothing to see yet")
+        return dumps(view.build(outline, parts, job.algorithms))
+
+    def outline(self, id: str) -> dict[str, Any] | None:
+        """The outline of a job's mission once a worker has told it."""
+        path = self._folder / id / OUTLINE
+        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+    def hear(self, message: dict[str, Any]) -> None:
+        """Take in what a running shard tells."""
+        watch = self._running.get(message["job"])
+        if watch is not None:
+            watch.hear(message)
+
+    def _check_size(self, scenario: ScenarioBase, names: list[str]) -> None:
+        problems = []
+        most = self._settings.most_trials
+        if scenario.trials > most:
+            problems.append(
+                Problem("trials", f"{scenario.trials} trials are too many for one job", f"ask for at most {most}")
+            )
+        subjects = max(len(getattr(scenario, "vehicles", ())), 1)
+        size = scenario.trials * subjects * len(names) * USUAL_TIMES * 6 * 8
+        if size > self._settings.largest_result:
+            fewer = math.floor(scenario.trials * self._settings.largest_result / size)
+            found = f"the result of {scenario.trials} trials would take about {size / 1e9:.1f} GB"
+            problems.append(Problem("trials", found, f"ask for at most {fewer}"))
+        if problems:
+            raise ScenarioError(problems)
+
+    def _begin(self, job: Job) -> None:
+        task = asyncio.create_task(self._run(job), name=f"job {job.id}")
+        self._tasks[job.id] = task
+        task.add_done_callback(lambda _: self._tasks.pop(job.id, None))
+
+    async def _run(self, job: Job) -> None:
+        try:
+            await self._cluster.ready.wait()
+            await self._compute(job)
+        except asyncio.CancelledError:
+            raise
+        except Exception as error:
+            log.exception("job %s failed", job.id, exc_info=error)
+            await self.journal.flush()
+            await asyncio.to_thread(self.store.change, job.id, state="failed", finished_at=now(), error=_told(error))
+            self.journal.wake()
+        finally:
+            self._running.pop(job.id, None)
+
+    async def _compute(self, job: Job) -> None:
+        folder = self._folder / job.id
+        await asyncio.to_thread(folder.mkdir, parents=True, exist_ok=True)
+        scenario = toml.loads(job.toml, origin=job.origin)
+        shards = runner.shards(scenario, job.algorithms)
+        finished = set(self.store.shards(job.id))
+        watch = self._running[job.id] = _Watch(job, len(shards), finished, self.journal, folder / OUTLINE)
+        watch.resume(self.store)
+        if job.state == "queued":
+            await asyncio.to_thread(self.store.change, job.id, state="running", started_at=now())
+            self.journal.wake()
+
+        homes = _homes(shards, await self._cluster.workers())
+        room = asyncio.Semaphore(max(4 * self._settings.workers, 8))
+
+        async def run(number: int, shard: Shard) -> None:
+            async with room:
+                answer = await self._cluster.run(
+                    job.id, number, job.toml, job.origin, shard, homes.get(shard.trials[0])
+                )
+                if answer is None:
+                    raise asyncio.CancelledError
+                await asyncio.to_thread(artifacts.write_shard, self._shard_file(job.id, number), shard, *answer)
+                watch.finish(number)
+                await asyncio.to_thread(self.store.finish_shard, job.id, number, watch.fraction)
+
+        try:
+            async with asyncio.TaskGroup() as group:
+                for number, shard in enumerate(shards):
+                    if number not in finished:
+                        group.create_task(run(number, shard))
+        except* Exception as errors:
+            await self._cluster.cancel(job.id)
+            raise errors.exceptions[0] from None
+        notes = await asyncio.to_thread(self._assemble, job, scenario)
+        await self.journal.flush()
+        await asyncio.to_thread(self.store.change, job.id, state="done", progress=1.0, finished_at=now(), notes=notes)
+        self.journal.wake()
+        await asyncio.to_thread(self._drop_shards, job.id)
+
+    def _assemble(self, job: Job, scenario: ScenarioBase) -> list[str]:
+        """Write the files of a finished job; what its algorithms want to be known."""
+        parts = self._parts(job)
+        result = runner.gather(scenario, parts, job.algorithms)
+        folder = self._folder / job.id
+        outline = self.outline(job.id)
+        assert outline is not None, "the shards of trial 0 tell the outline before they finish"
+        artifacts.write_text(folder / VIEW, dumps(view.build(outline, parts, job.algorithms)))
+        artifacts.write_result(folder, result)
+        return [f"{name}: {note}" for name, tracks in result.tracks.items() for note in tracks.notes]
+
+    def _parts(self, job: Job) -> view.Parts:
+        with contextlib.suppress(FileNotFoundError):
+            return [artifacts.read_shard(self._shard_file(job.id, n)) for n in self.store.shards(job.id)]
+        return []
+
+    def _shard_file(self, id: str, number: int) -> Path:
+        return self._folder / id / f"shard-{number}.npz"
+
+    def _drop_shards(self, id: str) -> None:
+        for path in (self._folder / id).glob("shard-*.npz"):
+            path.unlink(missing_ok=True)
+
+
+class _Watch:
+    """How far a running job is, as told by its shards."""
+
+    def __init__(self, job: Job, shards: int, finished: set[int], journal: Journal, outline: Path) -> None:
+        self._job, self._journal, self._outline = job, journal, outline
+        self._told = dict.fromkeys(finished, 1.0)
+        self._shards, self._done = shards, set(finished)
+        self._last: dict[str, float] = {}
+        self._said = -math.inf
+
+    @property
+    def fraction(self) -> float:
+        """The share of the work done."""
+        return sum(self._told.values()) / self._shards
+
+    def resume(self, store: Store) -> None:
+        """Learn which estimates were told before a restart."""
+        after = 0
+        while events := store.events(self._job.id, after):
+            after = events[-1].id
+            for event in events:
+                if event.kind == "estimates":
+                    data = json.loads(event.data)
+                    self._last[data["algorithm"]] = data["time_s"][-1]
+
+    def hear(self, message: dict[str, Any]) -> None:
+        number = message["number"]
+        if message["outline"] is not None and not self._outline.exists():
+            artifacts.write_text(self._outline, dumps(message["outline"]))
+            self._journal.wake()
+        if message["partial"]:
+            self._estimates(message["algorithm"], message["partial"])
+        self._told[number] = max(self._told.get(number, 0.0), min(message["fraction"], 1.0))
+        self._progress()
+
+    def finish(self, number: int) -> None:
+        self._told[number] = 1.0
+        self._done.add(number)
+        self._progress(always=True)
+
+    def _estimates(self, algorithm: str, partial: dict[str, Any]) -> None:
+        """Pass on points later than those passed on before: a shard that runs again tells them again."""
+        last = self._last.get(algorithm, -math.inf)
+        times = partial["time_s"]
+        start = next((i for i, t in enumerate(times) if t > last), len(times))
+        if start == len(times):
+            return
+        self._last[algorithm] = times[-1]
+        new = {"algorithm": algorithm, "time_s": times[start:]}
+        for what, digits in (("mean", 3), ("cov", 6)):
+            new[what] = {
+                subject: [[round(x, digits) for x in row] for row in rows[start:]]
+                for subject, rows in partial[what].items()
+            }
+        self._journal.say(self._job.id, "estimates", new)
+
+    def _progress(self, always: bool = False) -> None:
+        moment = asyncio.get_running_loop().time()
+        if always or moment - self._said >= PROGRESS_S:
+            self._said = moment
+            done = {"fraction": self.fraction, "shards_done": len(self._done), "shards": self._shards}
+            self._journal.say(self._job.id, "progress", done)
+
+
+def _homes(shards: list[Shard], workers: list[str]) -> dict[int, str]:
+    """A worker for every block of trials, so that its mission is flown once; none where blocks are few."""
+    blocks = list(dict.fromkeys(s.trials[0] for s in shards))
+    if len(blocks) < len(workers) or not workers:
+        return {}
+    return {block: workers[n % len(workers)] for n, block in enumerate(blocks)}
+
+
+def _told(error: BaseException) -> dict[str, str]:
+    """A failure in the words of the person who ran the job."""
+    if isinstance(error, ScenarioError):
+        return {"title": "The scenario cannot be run", "detail": str(error)}
+    if isinstance(error, KilledWorker):
+        return {"title": "A worker died", "detail": "a part of the job ended its worker process several times"}
+    if isinstance(error, FileNotFoundError):
+        return {"title": "A file is missing", "detail": str(error)}
+    return {"title": "An estimator failed", "detail": f"{type(error).__name__}: {error}"}

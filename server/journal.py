@@ -1,0 +1,78 @@
+"""The running record of jobs: events go to the store in batches, and readers are woken after each."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import Any
+
+from server.store import FINAL, Event, Store
+from server.wire import dumps
+
+#: Events that arrive within this time are committed together.
+BATCH_S = 0.03
+
+
+class Journal:
+    """Appends and follows events; belongs to one event loop."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._waiting: list[tuple[str, str, str]] = []
+        self._writing: asyncio.Task[None] | None = None
+        self._news = asyncio.Event()
+        self.closing = asyncio.Event()
+
+    def say(self, job: str, kind: str, data: Any) -> None:
+        """Record an event soon."""
+        self._waiting.append((job, kind, dumps(data)))
+        if self._writing is None or self._writing.done():
+            self._writing = asyncio.create_task(self._write())
+
+    async def _write(self) -> None:
+        while self._waiting:
+            await asyncio.sleep(BATCH_S)
+            await self._commit()
+
+    async def _commit(self) -> None:
+        batch, self._waiting = self._waiting, []
+        if batch:
+            await asyncio.to_thread(self._store.append, batch)
+        self.wake()
+
+    async def flush(self) -> None:
+        """Return when everything said so far is in the store."""
+        await self._commit()
+        if self._writing is not None:
+            await self._writing
+
+    def wake(self) -> None:
+        """Let readers look at the store again."""
+        self._news.set()
+        self._news = asyncio.Event()
+
+    def close(self) -> None:
+        """End all readers: the server is going down."""
+        self.closing.set()
+        self.wake()
+
+    async def follow(self, job: str, after: int = 0, pause_s: float = 15.0) -> AsyncIterator[Event | None]:
+        """A job's events after an event id as they come, up to its final state; None when it was quiet for long.
+
+        Ends where the job has ended, is deleted, or the server closes.
+        """
+        while not self.closing.is_set():
+            news = self._news
+            found = self._store.job(job)
+            events = self._store.events(job, after)
+            for event in events:
+                yield event
+                after = event.id
+            if events:
+                continue
+            if found is None or found.state in FINAL:
+                return
+            try:
+                await asyncio.wait_for(news.wait(), pause_s)
+            except TimeoutError:
+                yield None

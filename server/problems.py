@@ -1,0 +1,103 @@
+"""Errors as problem+json (RFC 9457): what is wrong, where, and what would be right."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+
+from engine.scenario.errors import ScenarioError
+from server.wire import dumps
+
+log = logging.getLogger(__name__)
+
+
+@dataclass
+class Refusal(Exception):
+    """A request that cannot be met: HTTP status, kind of problem, and what to tell the person.
+
+    errors: {"key", "message", "remedy"} each, for input at fault.
+    """
+
+    status: int
+    kind: str
+    detail: str
+    errors: list[dict[str, Any]] = field(default_factory=list)
+    headers: dict[str, str] = field(default_factory=dict)
+
+
+def response(refusal: Refusal) -> Response:
+    """The answer that tells of a refusal."""
+    body: dict[str, Any] = {
+        "type": f"urn:coopnav:{refusal.kind}",
+        "title": HTTPStatus(refusal.status).phrase,
+        "status": refusal.status,
+        "detail": refusal.detail,
+    }
+    if refusal.errors:
+        body["errors"] = refusal.errors
+    return Response(
+        dumps(body), status_code=refusal.status, media_type="application/problem+json", headers=refusal.headers
+    )
+
+
+def of_scenario(error: ScenarioError) -> Refusal:
+    """A scenario's problems, each with its key path."""
+    errors = [{"key": p.key, "message": p.message, "remedy": p.remedy} for p in error.problems]
+    return Refusal(422, "scenario", str(error), errors)
+
+
+def _of_validation(error: RequestValidationError) -> Refusal:
+    """What the request's shape got wrong; never what it said, which may not even be JSON."""
+    errors = [
+        {
+            "key": ".".join(str(part) for part in e["loc"][1:]) or str(e["loc"][0]),
+            "message": e["msg"],
+            "remedy": "",
+            "type": e["type"],
+        }
+        for e in error.errors()
+    ]
+    detail = "; ".join(f"{e['key']}: {e['message']}" for e in errors[:5])
+    return Refusal(422, "request", detail, errors)
+
+
+def _of_http(error: HTTPException) -> Refusal:
+    kind = {404: "unknown", 405: "method"}.get(error.status_code, "http")
+    return Refusal(error.status_code, kind, str(error.detail), headers=dict(error.headers or {}))
+
+
+def install(app: FastAPI) -> None:
+    """Answer every error of an app as a problem."""
+
+    async def refused(_: Request, error: Exception) -> Response:
+        assert isinstance(error, Refusal)
+        return response(error)
+
+    async def bad_scenario(_: Request, error: Exception) -> Response:
+        assert isinstance(error, ScenarioError)
+        return response(of_scenario(error))
+
+    async def bad_request(_: Request, error: Exception) -> Response:
+        assert isinstance(error, RequestValidationError)
+        return response(_of_validation(error))
+
+    async def bad_http(_: Request, error: Exception) -> Response:
+        assert isinstance(error, HTTPException)
+        return response(_of_http(error))
+
+    async def broken(request: Request, error: Exception) -> Response:
+        log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+        return response(Refusal(500, "internal", "the server failed to answer this; its log says why"))
+
+    app.add_exception_handler(Refusal, refused)
+    app.add_exception_handler(ScenarioError, bad_scenario)
+    app.add_exception_handler(RequestValidationError, bad_request)
+    app.add_exception_handler(HTTPException, bad_http)
+    app.add_exception_handler(Exception, broken)

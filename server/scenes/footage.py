@@ -1,0 +1,100 @@
+"""What panes draw from: a job's mission, and its estimates as far as they have come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass
+class Track:
+    """One algorithm's estimates of trial 0: time_s (n,), mean {S: (n, 2)} m, cov {S: (n, 3)} m^2 (xx xy yy)."""
+
+    time_s: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    mean: dict[str, np.ndarray] = field(default_factory=dict)
+    cov: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def grow(self, news: dict[str, Any]) -> None:
+        """Append an `estimates` event."""
+        self.time_s = np.concatenate([self.time_s, numbers(news["time_s"], 0)])
+        for mine, theirs, width in ((self.mean, news["mean"], 2), (self.cov, news["cov"], 3)):
+            for subject, rows in theirs.items():
+                mine[subject] = np.concatenate([mine.get(subject, np.zeros((0, width))), numbers(rows, width)])
+
+
+@dataclass(frozen=True)
+class Packet:
+    """A broadcast on its way from one subject to another, both by number."""
+
+    sender: int
+    receiver: int
+    tol_s: float
+    toa_s: float
+    heard: bool
+
+
+@dataclass(frozen=True)
+class Footage:
+    """A job's mission: report times, subjects, truth {S: (T, 2)} m of trial 0, packets by time of launch."""
+
+    time_s: np.ndarray
+    subjects: list[dict[str, Any]]
+    truth: dict[str, np.ndarray]
+    packets: list[Packet]
+    tracks: dict[str, Track]
+
+    @property
+    def names(self) -> list[str]:
+        return [s["name"] for s in self.subjects]
+
+    @property
+    def latest_s(self) -> float:
+        """The time that the furthest estimate has reached."""
+        return max((float(t.time_s[-1]) for t in self.tracks.values() if len(t.time_s)), default=0.0)
+
+    def points(self) -> np.ndarray:
+        """All positions there are (N, 2) m, for the extent."""
+        parts = list(self.truth.values()) + [m for t in self.tracks.values() for m in t.mean.values()]
+        return np.concatenate([np.zeros((0, 2)), *parts])
+
+
+def footage(view: dict[str, Any], algorithms: list[str]) -> Footage:
+    """The footage of a view, or of an outline, which has no estimates yet."""
+    names = [s["name"] for s in view["subjects"]]
+    number = {name: n for n, name in enumerate(names)}
+    time_s = numbers(view["time_s"], 0)
+    tracks = {name: Track() for name in algorithms}
+    for name in algorithms:
+        for subject, found in view.get("algorithms", {}).get(name, {"subjects": {}})["subjects"].items():
+            if found["mean"]:
+                tracks[name].time_s = time_s
+                tracks[name].mean[subject] = numbers(found["mean"], 2)
+                tracks[name].cov[subject] = numbers(found["cov"], 3)
+    packets = [
+        Packet(number[e["from"]], number[e["to"]], e["tol_s"], e["toa_s"], e["heard"])
+        for e in view["events"]
+        if e["kind"] == "packet" and e["from"] in number and e["to"] in number
+    ]
+    truth = {s: numbers(p, 2) for s, p in view["truth"].items()}
+    return Footage(time_s, view["subjects"], truth, sorted(packets, key=lambda p: p.tol_s), tracks)
+
+
+def numbers(rows: Any, width: int) -> np.ndarray:
+    """Rows of JSON as floats (n, width), (n,) for width 0; null is NaN."""
+    array = np.array(rows, dtype=float)
+    return array.reshape(-1, width) if width else array.reshape(-1)
+
+
+def at(time_s: np.ndarray, rows: np.ndarray, moment_s: float) -> np.ndarray:
+    """Rows (n, k) at times (n,) interpolated at a moment, held before the first and after the last."""
+    if not len(time_s):
+        return np.full(rows.shape[1], np.nan)
+    n = int(np.searchsorted(time_s, moment_s, side="right"))
+    if n == 0 or n == len(time_s):
+        return rows[max(n - 1, 0)]
+    share = (moment_s - time_s[n - 1]) / (time_s[n] - time_s[n - 1])
+    if not np.isfinite(rows[n]).all():
+        return rows[n - 1]
+    return rows[n - 1] + share * (rows[n] - rows[n - 1])

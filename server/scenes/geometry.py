@@ -1,0 +1,66 @@
+"""From metres to the scene: scale, tracks as line segments, ellipses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: A mission is drawn this wide (scene units): viser's camera, grid and labels are made for such sizes.
+SPAN = 10.0
+#: Depths are stretched until the deepest subject is this far down (scene units), but at most tenfold.
+DEPTH_SHOWN, DEPTH_STRETCH = 0.7, 10.0
+#: chi-square with 2 degrees of freedom at 95 %: Mahalanobis radius of the ellipses.
+RADIUS_95 = float(np.sqrt(-2.0 * np.log(0.05)))
+CORNERS = 24
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Where metres are in the scene: centre (2,) m, scale in units per metre, stretch of depths."""
+
+    centre: np.ndarray
+    scale: float
+    stretch: float
+
+    def place(self, xy_m: np.ndarray, depth_m: float | np.ndarray = 0.0) -> np.ndarray:
+        """Scene positions (..., 3) of points (..., 2) m at a depth."""
+        flat = (np.asarray(xy_m, dtype=float) - self.centre) * self.scale
+        down = np.broadcast_to(-np.asarray(depth_m, dtype=float) * self.scale * self.stretch, flat.shape[:-1])
+        return np.concatenate([flat, down[..., None]], axis=-1)
+
+
+def chart(points_m: np.ndarray, deepest_m: float) -> Chart:
+    """The chart that shows points (N, 2) m, NaN among them allowed, in a square of SPAN."""
+    known = points_m[np.isfinite(points_m).all(axis=-1)]
+    low, high = (known.min(axis=0), known.max(axis=0)) if len(known) else (np.full(2, -500.0), np.full(2, 500.0))
+    scale = SPAN / max(float((high - low).max()), 10.0)
+    stretch = min(max(DEPTH_SHOWN / (deepest_m * scale), 1.0), DEPTH_STRETCH) if deepest_m > 0 else 1.0
+    return Chart((low + high) / 2, scale, stretch)
+
+
+def segments(line: np.ndarray, dashed: bool = False) -> np.ndarray:
+    """A line through points (N, 3) as segments (M, 2, 3), left out where a point is not finite; dashed: every other."""
+    pairs = np.stack([line[:-1], line[1:]], axis=1) if len(line) > 1 else np.zeros((0, 2, 3))
+    pairs = pairs[::2] if dashed else pairs
+    return pairs[np.isfinite(pairs.sum(axis=(1, 2)))]
+
+
+def ellipses(chart: Chart, mean_m: np.ndarray, cov_m2: np.ndarray, depth_m: float) -> np.ndarray:
+    """95 % ellipses of beliefs, mean (N, 2) m and cov (N, 3) as xx xy yy, as segments (N, CORNERS, 2, 3)."""
+    xx, xy, yy = cov_m2[:, 0], cov_m2[:, 1], cov_m2[:, 2]
+    matrix = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)
+    sound = np.isfinite(matrix.sum(axis=(1, 2))) & np.isfinite(mean_m.sum(axis=1))
+    value, vector = np.linalg.eigh(np.where(sound[:, None, None], matrix, 0.0))
+    axes = vector * np.sqrt(np.maximum(value, 0.0))[:, None, :] * RADIUS_95
+    angle = np.linspace(0.0, 2 * np.pi, CORNERS + 1)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    outline = np.swapaxes(axes @ circle, 1, 2) + np.where(sound[:, None], mean_m, 0.0)[:, None, :]
+    ring = chart.place(outline, depth_m)
+    return np.stack([ring[:, :-1], ring[:, 1:]], axis=2)[sound]
+
+
+def round_length(metres: float) -> float:
+    """The next smaller of 1, 2, 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(metres))
+    return float(max(m for m in (power, 2 * power, 5 * power) if m <= metres * (1 + 1e-9)))

@@ -1,0 +1,241 @@
+"""One algorithm's pane: what stands still is sent once, what moves is sent again for every moment shown."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, replace
+
+import numpy as np
+import rich
+import viser
+
+from server.scenes import palette
+from server.scenes.footage import Footage, at
+from server.scenes.geometry import SPAN, Chart, ellipses, round_length, segments
+from server.view import thinned
+
+#: What a browser can draw smoothly even without a graphics card.
+TRACK_POINTS, ELLIPSES, RAYS = 250, 20, 12
+#: Ellipses smaller than this (scene units) are not worth their lines.
+SMALLEST = 0.02
+#: A ray is seen for this share of the mission, and at least this long.
+RAY_SHARE, RAY_S = 0.006, 3.0
+
+OBLIQUE, ABOVE = np.array([0.0, -0.82, 0.78]) * SPAN, np.array([0.0, -0.01, 1.15]) * SPAN
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to show: estimated trails, ranging rays, past ellipses; a vehicle to follow; the view from above."""
+
+    trails: bool = True
+    rays: bool = True
+    ellipses: bool = True
+    follow: str | None = None
+    top: bool = False
+
+
+class Pane:
+    """A viser server on loopback that shows one algorithm's estimates of a mission."""
+
+    def __init__(self) -> None:
+        rich.get_console().quiet = True
+        self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self._lock = threading.Lock()
+        self._followed: np.ndarray | None = None
+        self._options = Options()
+        self.footage: Footage
+        self._chart: Chart
+        scene = self.server.scene
+        scene.configure_environment_map(hdri=None)
+        scene.configure_default_lights(enabled=True, cast_shadow=False)
+        scene.add_light_ambient("/light", intensity=2.0)
+        scene.set_background_image(np.full((2, 2, 3), palette.WATER, dtype=np.uint8), format="png")
+        self.server.initial_camera.position = tuple(OBLIQUE)
+        self.server.initial_camera.look_at = (0.0, 0.0, 0.0)
+
+    @property
+    def port(self) -> int:
+        return self.server.get_port()
+
+    def close(self) -> None:
+        self.server.stop()
+
+    def stage(self, footage: Footage, chart: Chart) -> None:
+        """Send what stands still: the sea surface, the true tracks, the vehicles with their names."""
+        self.footage, self._chart = footage, chart
+        scene = self.server.scene
+        with self._lock, self.server.atomic():
+            cell = round_length(SPAN / chart.scale / 10) * chart.scale
+            scene.add_grid(
+                "/surface",
+                width=1.3 * SPAN,
+                height=1.3 * SPAN,
+                cell_size=cell,
+                section_size=5 * cell,
+                cell_color=palette.GRID,
+                section_color=palette.GRID_SECTION,
+                shadow_opacity=0.0,
+            )
+            dashes = [
+                segments(chart.place(_thin(track, 2 * TRACK_POINTS), self._depth(subject)), dashed=True)
+                for subject, track in footage.truth.items()
+                if self._moves(subject)
+            ]
+            self._lines("/truth", dashes, [palette.TRUTH] * len(dashes), 1.5)
+            for n, subject in enumerate(footage.subjects):
+                self._vehicle(n, subject)
+
+    def _vehicle(self, n: int, subject: dict) -> None:
+        scene, colour, up = (
+            self.server.scene,
+            palette.vehicle(n),
+            -self._chart.place(np.zeros(2), subject["depth_m"])[2],
+        )
+        scene.add_frame(f"/vehicle/{n}", show_axes=False, visible=False)
+        radius = 0.06 if subject["kind"] == "fixed" else 0.1
+        scene.add_icosphere(f"/vehicle/{n}/body", radius=radius, color=colour, subdivisions=2, cast_shadow=False)
+        scene.add_label(
+            f"/vehicle/{n}/name",
+            subject["name"],
+            position=(0.0, 0.0, 0.2),
+            font_screen_scale=0.9,
+            anchor="bottom-center",
+        )
+        if up > 0.02:
+            mast = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, up]]])
+            self._lines(f"/vehicle/{n}/mast", [mast], [palette.faded(colour, 0.5)], 1.0)
+        scene.add_icosphere(
+            f"/true/{n}", radius=0.6 * radius, color=palette.TRUTH, subdivisions=2, cast_shadow=False, visible=False
+        )
+
+    def show(self, algorithm: str, moment_s: float, options: Options) -> None:
+        """Draw one algorithm's estimates as they are at a moment of the mission."""
+        footage, track = self.footage, self.footage.tracks[algorithm]
+        now: dict[str, np.ndarray] = {s: at(track.time_s, mean, moment_s) for s, mean in track.mean.items()}
+        truth = {s: at(footage.time_s, p, moment_s) for s, p in footage.truth.items()}
+        with self._lock, self.server.atomic():
+            self._trails(algorithm, moment_s, now, options)
+            self._present(algorithm, moment_s, now, truth)
+            self._rays(moment_s, now, truth, options)
+            self._place(now, truth)
+        self._camera(now, options)
+
+    def _trails(self, algorithm: str, moment_s: float, now: dict[str, np.ndarray], options: Options) -> None:
+        """Estimated tracks up to the moment, and the ellipses along them."""
+        footage, track = self.footage, self.footage.tracks[algorithm]
+        lines, rings, colours, shades = [], [], [], []
+        horizon = max(len(footage.time_s), len(track.time_s))
+        past = int(np.searchsorted(track.time_s, moment_s, side="right"))
+        shown, ringed = thinned(horizon, TRACK_POINTS), thinned(horizon, ELLIPSES)
+        for n, name in enumerate(footage.names):
+            if name not in track.mean or not self._moves(name):
+                continue
+            depth, mean = self._depth(name), track.mean[name]
+            line = np.concatenate([mean[shown[shown < past]], now[name][None]])
+            lines.append(segments(self._chart.place(line, depth)))
+            colours.append(palette.vehicle(n))
+            chosen = ringed[ringed < past]
+            drawn = ellipses(self._chart, mean[chosen], track.cov[name][chosen], depth)
+            rings.append(_visible(drawn))
+            shades.append(palette.faded(palette.vehicle(n), 0.35))
+        self._lines("/trails", lines if options.trails else [], colours, 2.0)
+        self._lines("/ellipses", rings if options.ellipses else [], shades, 1.2)
+
+    def _present(
+        self, algorithm: str, moment_s: float, now: dict[str, np.ndarray], truth: dict[str, np.ndarray]
+    ) -> None:
+        """The present ellipses, and from every estimate a line to the truth."""
+        track = self.footage.tracks[algorithm]
+        lines, colours = [], []
+        for n, name in enumerate(self.footage.names):
+            if name not in now:
+                continue
+            cov = at(track.time_s, track.cov[name], moment_s)
+            lines.append(ellipses(self._chart, now[name][None], cov[None], self._depth(name)).reshape(-1, 2, 3))
+            colours.append(palette.vehicle(n))
+            if name in truth:
+                ends = self._chart.place(np.stack([now[name], truth[name]]), self._depth(name))
+                lines.append(segments(ends))
+                colours.append(palette.TRUTH)
+        self._lines("/present", lines, colours, 3.5)
+
+    def _rays(
+        self, moment_s: float, now: dict[str, np.ndarray], truth: dict[str, np.ndarray], options: Options
+    ) -> None:
+        """Packets on their way or just arrived: the sender's colour when heard, grey when lost, fading."""
+        footage = self.footage
+        last = max(RAY_S, RAY_SHARE * float(footage.time_s[-1])) if len(footage.time_s) else RAY_S
+        names = footage.names
+        recent = [p for p in footage.packets if p.tol_s <= moment_s <= p.toa_s + last][-RAYS:] if options.rays else []
+        lines, colours = [], []
+        for packet in recent:
+            ends = [
+                truth.get(names[v], now.get(names[v], np.full(2, np.nan))) for v in (packet.sender, packet.receiver)
+            ]
+            depths = np.array([self._depth(names[v]) for v in (packet.sender, packet.receiver)])
+            age = min(max((moment_s - packet.toa_s) / last, 0.0), 1.0)
+            colour = palette.vehicle(packet.sender) if packet.heard else palette.LOST
+            lines.append(segments(self._chart.place(np.stack(ends), depths)))
+            colours.append(palette.faded(colour, 0.85 * age))
+        self._lines("/rays", lines, colours, 2.5)
+
+    def _place(self, now: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> None:
+        for n, name in enumerate(self.footage.names):
+            for node, places in ((f"/vehicle/{n}", now), (f"/true/{n}", truth)):
+                known = name in places and bool(np.isfinite(places[name]).all())
+                handle = self.server.scene.get_handle_by_name(node)
+                if handle is None:
+                    continue
+                if known:
+                    handle.position = self._chart.place(places[name], self._depth(name))
+                if handle.visible != known:
+                    handle.visible = known
+
+    def _camera(self, now: dict[str, np.ndarray], options: Options) -> None:
+        """Go along with the vehicle that is followed; look from above, or obliquely again, when asked."""
+        clients = list(self.server.get_clients().values())
+        if options.top != self._options.top:
+            for client in clients:
+                client.camera.look_at = np.zeros(3)
+                client.camera.position = ABOVE if options.top else OBLIQUE
+        target = now.get(options.follow) if options.follow else None
+        if target is None or not np.isfinite(target).all():
+            self._followed = None
+        else:
+            place = self._chart.place(target)
+            for client in clients:
+                step = place - (client.camera.look_at if self._followed is None else self._followed)
+                client.camera.position = client.camera.position + step * np.array([1.0, 1.0, 0.0])
+            self._followed = place
+        self._options = replace(options)
+
+    def _depth(self, subject: str) -> float:
+        return next((s["depth_m"] for s in self.footage.subjects if s["name"] == subject), 0.0) or 0.0
+
+    def _moves(self, subject: str) -> bool:
+        return all(s["kind"] != "fixed" for s in self.footage.subjects if s["name"] == subject)
+
+    def _lines(self, name: str, lines: list[np.ndarray], colours: list[palette.Rgb], pixels: float) -> None:
+        """One set of line segments under a name that is used again; each line (M, 2, 3) in its colour."""
+        drawn = [line.reshape(-1, 2, 3) for line in lines]
+        points = np.concatenate([np.zeros((0, 2, 3)), *drawn]).astype(np.float32)
+        shades = np.concatenate(
+            [
+                np.zeros((0, 2, 3), np.uint8),
+                *(np.broadcast_to(np.array(c, np.uint8), line.shape) for line, c in zip(drawn, colours)),
+            ]
+        ).astype(np.uint8)
+        if not len(points):
+            points, shades = np.full((1, 2, 3), -1000.0, np.float32), np.full((1, 2, 3), palette.WATER, np.uint8)
+        self.server.scene.add_line_segments(name, points, shades, thickness=pixels, thickness_units="screen")
+
+
+def _thin(track: np.ndarray, most: int) -> np.ndarray:
+    return track[thinned(len(track), most)]
+
+
+def _visible(rings: np.ndarray) -> np.ndarray:
+    """Rings (N, CORNERS, 2, 3) that are large enough to be seen, as segments (M, 2, 3)."""
+    width = np.ptp(rings[..., 0, :2], axis=1).max(axis=-1, initial=0.0) if len(rings) else np.zeros(0)
+    return rings[width > SMALLEST].reshape(-1, 2, 3)

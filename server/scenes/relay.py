@@ -1,0 +1,81 @@
+"""The way to a pane's viser server: its client page, and its websocket passed through our own port."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+
+import msgspec
+import websockets
+from fastapi import WebSocket, WebSocketDisconnect
+from websockets.asyncio.client import connect
+from websockets.typing import Subprotocol
+
+from server.assets import viser_client
+
+#: All that a viewer of a pane has to say; above all it may not ask viser for a public share tunnel.
+ALLOWED = {"ViewerCameraMessage"}
+LARGEST = 64 * 1024
+
+POLICY = (
+    "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
+    "worker-src blob: data:; style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; "
+    "connect-src 'self' data: blob:; frame-ancestors 'self'; base-uri 'none'"
+)
+
+#: An unfocused pane must reconnect too, and a pane shows its scene alone.
+HEAD = """<script>document.hasFocus = () => true;</script><style>
+.mantine-Paper-root, .mantine-Notifications-root, .mantine-Affix-root { display: none !important; }
+</style>"""
+
+
+def page() -> str:
+    """viser's client as panes use it."""
+    before, head, after = viser_client().partition("<head>")
+    return before + head + HEAD + after
+
+
+def permitted(data: bytes) -> bool:
+    """Whether a viewer's message may reach viser."""
+    try:
+        message = msgspec.msgpack.decode(data)
+    except (msgspec.DecodeError, RecursionError):
+        return False
+    return isinstance(message, dict) and message.get("type") in ALLOWED
+
+
+async def relay(viewer: WebSocket, port: int) -> None:
+    """Pass a viewer's websocket on to viser on a loopback port, both ways, until either ends."""
+    offered = [Subprotocol(p) for p in viewer.scope.get("subprotocols", [])]
+    try:
+        upstream = await connect(
+            f"ws://127.0.0.1:{port}/", subprotocols=offered or None, max_size=None, compression=None, proxy=None
+        )
+    except (OSError, websockets.InvalidHandshake):
+        await viewer.close(1013)
+        return
+    async with upstream:
+        await viewer.accept(subprotocol=upstream.subprotocol)
+
+        async def down() -> None:
+            async for data in upstream:
+                await viewer.send_bytes(data if isinstance(data, bytes) else data.encode())
+
+        async def up() -> None:
+            while True:
+                message = await viewer.receive()
+                if message["type"] == "websocket.disconnect":
+                    return
+                data = message.get("bytes") or b""
+                if len(data) <= LARGEST and permitted(data):
+                    await upstream.send(data)
+
+        ways = [asyncio.create_task(down()), asyncio.create_task(up())]
+        try:
+            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for way in ways:
+                way.cancel()
+            await asyncio.gather(*ways, return_exceptions=True)
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                await viewer.close()

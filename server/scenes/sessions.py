@@ -1,0 +1,226 @@
+"""Browser sessions with 3D panes: which job each shows, at which moment, and where its panes are found."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import secrets
+from collections.abc import Awaitable, Callable
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from server.jobs import Jobs
+from server.problems import Refusal
+from server.scenes.cameras import Cameras
+from server.scenes.footage import Footage, footage
+from server.scenes.geometry import Chart, chart
+from server.scenes.pane import Options, Pane
+from server.settings import Settings
+
+log = logging.getLogger(__name__)
+
+BROKEN = "the 3D panes could not be drawn; the server's log says why"
+
+Send = Callable[[dict[str, Any]], Awaitable[None]]
+
+
+class Sessions:
+    """All sessions of the server, and the panes by the secret ids in their paths."""
+
+    def __init__(self, settings: Settings, jobs: Jobs) -> None:
+        self.settings, self.jobs = settings, jobs
+        self.panes: dict[str, Pane] = {}
+        self._open: set[Session] = set()
+
+    def open(self, send: Send) -> Session:
+        """A new session that answers through `send`."""
+        session = Session(self, send)
+        self._open.add(session)
+        return session
+
+    async def shut(self, session: Session) -> None:
+        """End a session and its panes."""
+        self._open.discard(session)
+        await session.close()
+
+    async def close(self) -> None:
+        """End all sessions."""
+        for session in list(self._open):
+            await self.shut(session)
+
+    async def add(self) -> tuple[str, Pane]:
+        """A new pane under a secret id; Refusal where there are too many."""
+        if len(self.panes) >= self.settings.panes_altogether:
+            raise Refusal(429, "panes", "too many 3D panes are open on this server; close some")
+        pane = await asyncio.to_thread(Pane)
+        id = secrets.token_urlsafe(18)
+        self.panes[id] = pane
+        return id, pane
+
+    async def remove(self, id: str) -> None:
+        pane = self.panes.pop(id, None)
+        if pane is not None:
+            await asyncio.to_thread(pane.close)
+
+
+class Session:
+    """One browser session: takes its messages, keeps its panes drawn; the newest moment asked for wins."""
+
+    def __init__(self, sessions: Sessions, send: Send) -> None:
+        self._sessions, self._send = sessions, send
+        self._panes: dict[str, tuple[str, Pane]] = {}
+        self._cameras = Cameras(asyncio.get_running_loop())
+        self._options = Options()
+        self._footage: Footage | None = None
+        self._chart: Chart | None = None
+        self._moment: float | None = None
+        self._stale = asyncio.Event()
+        self._drawing = asyncio.Lock()
+        self._painter = asyncio.create_task(self._paint())
+        self._following: asyncio.Task[None] | None = None
+
+    async def take(self, text: str) -> None:
+        """Act on a message of the browser; what is wrong with it is told, not raised."""
+        try:
+            message = json.loads(text)
+            kind = message["type"]
+            if kind == "show":
+                await self._show(str(message["job"]), [str(name) for name in message["panes"]])
+            elif kind == "seek":
+                self._seek(float(message["time_s"]))
+            elif kind == "options":
+                self._choose(message)
+            else:
+                raise ValueError(f"there are no messages of type {str(kind)[:40]!r}")
+        except Refusal as refusal:
+            await self._send({"type": "error", "detail": refusal.detail})
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            await self._send({"type": "error", "detail": f"message not understood: {error}"})
+
+    async def close(self) -> None:
+        for task in (self._painter, self._following):
+            if task is not None:
+                task.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await task
+        async with self._drawing:
+            for name in list(self._panes):
+                await self._drop(name)
+
+    async def _show(self, job: str, names: list[str]) -> None:
+        found = self._sessions.jobs.find(job)
+        names = list(dict.fromkeys(names))
+        if len(names) > self._sessions.settings.panes_per_session:
+            raise Refusal(422, "panes", f"at most {self._sessions.settings.panes_per_session} panes at once")
+        for name in names:
+            if name not in found.algorithms:
+                raise Refusal(422, "panes", f"{name!r} does not run in this job")
+        if self._following is not None:
+            self._following.cancel()
+        async with self._drawing:
+            self._footage = self._chart = self._moment = None
+            for name in [n for n in self._panes if n not in names]:
+                await self._drop(name)
+            for name in names:
+                if name not in self._panes:
+                    id, pane = await self._sessions.add()
+                    self._panes[name] = id, pane
+                    self._cameras.join(pane)
+        panes = {name: f"/scenes/{self._panes[name][0]}/" for name in names}
+        await self._send({"type": "scenes", "panes": panes})
+        self._following = asyncio.create_task(self._follow(job, names))
+
+    def _seek(self, time_s: float) -> None:
+        if not np.isfinite(time_s):
+            raise ValueError("time_s is not a number")
+        self._moment = time_s
+        self._stale.set()
+
+    def _choose(self, message: dict[str, Any]) -> None:
+        known = {f.name: f for f in fields(Options)}
+        chosen = {k: v for k, v in message.items() if k != "type"}
+        for key, value in chosen.items():
+            if key not in known:
+                raise ValueError(f"there is no option {key[:40]!r}; there are {', '.join(known)}")
+            right = isinstance(value, str | None) if key == "follow" else isinstance(value, bool)
+            if not right:
+                raise ValueError(
+                    f"option {key}: {'a name or null' if key == 'follow' else 'true or false'} is expected"
+                )
+        self._options = replace(self._options, **chosen)
+        self._stale.set()
+
+    async def _drop(self, name: str) -> None:
+        id, pane = self._panes.pop(name)
+        self._cameras.leave(pane)
+        await self._sessions.remove(id)
+
+    async def _follow(self, job: str, names: list[str]) -> None:
+        """Gather a job's footage: all of a finished one, else as its estimates come in."""
+        jobs = self._sessions.jobs
+        try:
+            state = jobs.find(job).state
+            if state != "done":
+                async for event in jobs.journal.follow(job, pause_s=1.0):
+                    if self._footage is None:
+                        outline = await asyncio.to_thread(jobs.outline, job)
+                        if outline is not None:
+                            await self._stage(footage(outline, names))
+                    if self._footage is None or event is None or event.kind != "estimates":
+                        continue
+                    news = json.loads(event.data)
+                    if news["algorithm"] in self._footage.tracks:
+                        self._footage.tracks[news["algorithm"]].grow(news)
+                        self._stale.set()
+            if jobs.find(job).state == "done":
+                view = json.loads(await asyncio.to_thread(jobs.view, job))
+                await self._stage(footage(view, names))
+        except Refusal as refusal:
+            await self._send({"type": "error", "detail": refusal.detail})
+        except asyncio.CancelledError:
+            raise
+        except Exception:
+            log.exception("a session's footage broke off")
+            await self._send({"type": "error", "detail": BROKEN})
+
+    async def _stage(self, new: Footage) -> None:
+        """Take new footage; send what stands still unless the panes have it already."""
+        async with self._drawing:
+            deepest = max((abs(s["depth_m"] or 0.0) for s in new.subjects), default=0.0)
+            wanted = self._chart if self._chart and new.truth else chart(new.points(), deepest)
+            if self._chart is None or wanted != self._chart:
+                self._chart = wanted
+                await asyncio.to_thread(self._stage_panes, new, wanted)
+            else:
+                for _, pane in self._panes.values():
+                    pane.footage = new
+            self._footage = new
+        self._stale.set()
+
+    def _stage_panes(self, new: Footage, where: Chart) -> None:
+        for _, pane in self._panes.values():
+            pane.stage(new, where)
+
+    async def _paint(self) -> None:
+        while True:
+            await self._stale.wait()
+            self._stale.clear()
+            async with self._drawing:
+                if self._footage is None:
+                    continue
+                moment = self._footage.latest_s if self._moment is None else self._moment
+                try:
+                    await asyncio.to_thread(self._show_panes, moment)
+                except Exception:
+                    log.exception("a 3D pane could not be drawn")
+                    await self._send({"type": "error", "detail": BROKEN})
+                    continue
+            await self._send({"type": "at", "time_s": moment})
+
+    def _show_panes(self, moment: float) -> None:
+        for name, (_, pane) in self._panes.items():
+            pane.show(name, moment, self._options)

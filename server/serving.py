@@ -1,0 +1,79 @@
+"""`coopnav serve`: the application on a port, until told to stop."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import socket
+import sys
+from dataclasses import replace
+
+import uvicorn
+
+from server.app import create_app
+from server.settings import Settings
+
+
+class CannotServe(Exception):
+    """The server cannot start, and why."""
+
+
+class _Server(uvicorn.Server):
+    """Ends event streams before it waits for open connections."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        site = getattr(self.config.app.state, "site", None)  # pyright: ignore
+        if site is not None:
+            site.journal.close()
+        await super().shutdown(sockets)
+
+
+def listen(settings: Settings) -> socket.socket:
+    """The listening socket; CannotServe where the address cannot be had."""
+    try:
+        family, _, _, _, address = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
+        listener = socket.socket(family)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise CannotServe(
+            f"cannot listen on {settings.host} port {settings.port}: {reason}; choose another with --port"
+        ) from None
+    return listener
+
+
+def serve(settings: Settings) -> None:
+    """Serve until interrupted; prints the address to open."""
+    if not settings.loopback and settings.token is None:
+        settings = replace(settings, token=secrets.token_urlsafe(24))
+    try:
+        settings.data.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CannotServe(
+            f"cannot keep data in {settings.data}: {error.strerror}; choose another folder with --data"
+        ) from None
+    listener = listen(settings)
+    settings = replace(settings, port=listener.getsockname()[1])
+    logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    print(f"coopnav is open at {address(settings)}", flush=True)
+    print(f"jobs and scenarios are kept in {settings.data}; Ctrl-C ends the server", file=sys.stderr, flush=True)
+    config = uvicorn.Config(
+        create_app(settings),
+        log_level="warning",
+        access_log=False,
+        ws_max_size=1024 * 1024,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=5,
+        server_header=False,
+    )
+    asyncio.run(_Server(config).serve(sockets=[listener]))
+
+
+def address(settings: Settings) -> str:
+    """What to open in a browser."""
+    host = socket.gethostname() if settings.host in ("0.0.0.0", "::") else settings.host
+    host = f"[{host}]" if ":" in host else host
+    token = f"/?token={settings.token}" if settings.token else "/"
+    return f"http://{host}:{settings.port}{token}"

@@ -1,0 +1,51 @@
+"""What one running server is told: where it listens, where it keeps things, how much it accepts."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import platformdirs
+
+
+def default_data() -> Path:
+    """The platform's folder for a user's data."""
+    return Path(platformdirs.user_data_dir("coopnav", appauthor=False))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Host and port, data folder, Dask scheduler address (None: a cluster of our own), and limits.
+
+    token, where set, is asked of everyone. workers counts the processes of our own cluster.
+    """
+
+    data: Path
+    host: str = "127.0.0.1"
+    port: int = 8000
+    cluster: str | None = None
+    token: str | None = None
+    workers: int = max(os.cpu_count() or 1, 2)
+    largest_body: int = 2 * 1024 * 1024
+    most_trials: int = 100_000
+    largest_result: int = 2 * 1024**3
+    most_jobs_waiting: int = 200
+    panes_per_session: int = 6
+    panes_altogether: int = 48
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only this machine can reach the server."""
+        return is_loopback(self.host)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host name or address means this machine alone."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

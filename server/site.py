@@ -1,0 +1,35 @@
+"""What the routers work with: one of everything a running server has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from server.cluster import Cluster
+from server.jobs import Jobs
+from server.journal import Journal
+from server.scenes.sessions import Sessions
+from server.settings import Settings
+from server.shelf import Shelf
+
+
+@dataclass(frozen=True)
+class Site:
+    """One running server's parts."""
+
+    settings: Settings
+    journal: Journal
+    cluster: Cluster
+    jobs: Jobs
+    shelf: Shelf
+    scenes: Sessions
+
+
+def _site(connection: HTTPConnection) -> Site:
+    return connection.app.state.site
+
+
+Here = Annotated[Site, Depends(_site)]

@@ -1,0 +1,202 @@
+"""Jobs, their events and their finished shards in SQLite: committed means kept."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from server.wire import dumps
+
+VERSION = 1
+FINAL = frozenset({"done", "failed", "cancelled"})
+
+SCHEMA = """
+CREATE TABLE jobs (
+    id TEXT PRIMARY KEY, state TEXT NOT NULL, title TEXT NOT NULL, scenario TEXT, family TEXT NOT NULL,
+    algorithms TEXT NOT NULL, trials INTEGER NOT NULL, seed INTEGER NOT NULL,
+    created_at TEXT NOT NULL, started_at TEXT, finished_at TEXT,
+    progress REAL NOT NULL, error TEXT, notes TEXT NOT NULL,
+    toml TEXT NOT NULL, origin TEXT NOT NULL,
+    idempotency_key TEXT UNIQUE, digest TEXT NOT NULL
+);
+CREATE TABLE events (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    job TEXT NOT NULL REFERENCES jobs(id) ON DELETE CASCADE, kind TEXT NOT NULL, data TEXT NOT NULL
+);
+CREATE INDEX events_of_job ON events(job, id);
+CREATE TABLE shards (
+    job TEXT NOT NULL REFERENCES jobs(id) ON DELETE CASCADE, number INTEGER NOT NULL,
+    PRIMARY KEY (job, number)
+);
+"""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job as the store has it; `public` is what its owner sees."""
+
+    id: str
+    state: str
+    title: str
+    scenario: str | None
+    family: str
+    algorithms: list[str]
+    trials: int
+    seed: int
+    created_at: str
+    toml: str
+    digest: str
+    origin: str = ""
+    idempotency_key: str | None = None
+    started_at: str | None = None
+    finished_at: str | None = None
+    progress: float = 0.0
+    error: dict[str, str] | None = None
+    notes: list[str] = field(default_factory=list)
+
+    def public(self) -> dict[str, Any]:
+        """The job as REST shows it."""
+        hidden = {"toml", "digest", "origin", "idempotency_key"}
+        return {k: v for k, v in asdict(self).items() if k not in hidden}
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a job: an ever increasing id, a kind, and JSON text."""
+
+    id: int
+    kind: str
+    data: str
+
+
+_JSON = {"algorithms", "error", "notes"}
+_COLUMNS = [f.name for f in fields(Job)]
+
+
+class Store:
+    """The database in a file; safe to use from any thread."""
+
+    def __init__(self, path: Path) -> None:
+        self._lock = threading.RLock()
+        self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+        self._db.row_factory = sqlite3.Row
+        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
+            self._db.execute(f"PRAGMA {pragma}")
+        found = self._db.execute("PRAGMA user_version").fetchone()[0]
+        if found == 0:
+            with self._transaction() as db:
+                for statement in SCHEMA.split(";"):
+                    db.execute(statement)
+                db.execute(f"PRAGMA user_version={VERSION}")
+        elif found != VERSION:
+            raise RuntimeError(f"{path} was written by another version of coopnav (schema {found}, here {VERSION})")
+
+    def close(self) -> None:
+        with self._lock:
+            self._db.close()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        with self._lock:
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._db
+            except BaseException:
+                self._db.execute("ROLLBACK")
+                raise
+            self._db.execute("COMMIT")
+
+    def add(self, job: Job) -> tuple[Job, bool]:
+        """Keep a new job and its first event; the earlier job and False where its idempotency key is known."""
+        with self._transaction() as db:
+            if job.idempotency_key is not None:
+                row = db.execute("SELECT * FROM jobs WHERE idempotency_key=?", (job.idempotency_key,)).fetchone()
+                if row is not None:
+                    return _job(row), False
+            values = [_text(name, getattr(job, name)) for name in _COLUMNS]
+            places = ",".join("?" * len(_COLUMNS))
+            db.execute(f"INSERT INTO jobs ({','.join(_COLUMNS)}) VALUES ({places})", values)
+            _append(db, job.id, "state", dumps(job.public()))
+        return job, True
+
+    def job(self, id: str) -> Job | None:
+        with self._lock:
+            row = self._db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone()
+        return _job(row) if row is not None else None
+
+    def jobs(self, limit: int = 200) -> list[Job]:
+        """The newest jobs first."""
+        with self._lock:
+            rows = self._db.execute("SELECT * FROM jobs ORDER BY rowid DESC LIMIT ?", (limit,)).fetchall()
+        return [_job(row) for row in rows]
+
+    def unfinished(self) -> list[Job]:
+        """Accepted jobs without an end, oldest first."""
+        with self._lock:
+            rows = self._db.execute("SELECT * FROM jobs WHERE state IN ('queued','running') ORDER BY rowid").fetchall()
+        return [_job(row) for row in rows]
+
+    def change(self, id: str, **values: Any) -> Job | None:
+        """Change a job and tell so in a state event; None where it is gone or already at its end."""
+        with self._transaction() as db:
+            row = db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone()
+            if row is None or row["state"] in FINAL:
+                return None
+            sets = ",".join(f"{name}=?" for name in values)
+            db.execute(f"UPDATE jobs SET {sets} WHERE id=?", [*(_text(n, v) for n, v in values.items()), id])
+            job = _job(db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone())
+            _append(db, id, "state", dumps(job.public()))
+        return job
+
+    def delete(self, id: str) -> None:
+        with self._transaction() as db:
+            db.execute("DELETE FROM jobs WHERE id=?", (id,))
+
+    def finish_shard(self, id: str, number: int, progress: float) -> None:
+        """Keep that a shard's file is complete."""
+        with self._transaction() as db:
+            db.execute("INSERT OR IGNORE INTO shards (job, number) VALUES (?,?)", (id, number))
+            db.execute("UPDATE jobs SET progress=max(progress,?) WHERE id=?", (progress, id))
+
+    def shards(self, id: str) -> list[int]:
+        """Numbers of the shards whose files are complete."""
+        with self._lock:
+            rows = self._db.execute("SELECT number FROM shards WHERE job=? ORDER BY number", (id,)).fetchall()
+        return [row["number"] for row in rows]
+
+    def append(self, events: Iterable[tuple[str, str, str]]) -> None:
+        """Keep events (job, kind, JSON text) in one commit; those of a job since deleted are dropped."""
+        with self._transaction() as db:
+            for job, kind, data in events:
+                if db.execute("SELECT 1 FROM jobs WHERE id=?", (job,)).fetchone():
+                    _append(db, job, kind, data)
+
+    def events(self, id: str, after: int = 0, limit: int = 100) -> list[Event]:
+        """The next events of a job after an event id."""
+        with self._lock:
+            rows = self._db.execute(
+                "SELECT id, kind, data FROM events WHERE job=? AND id>? ORDER BY id LIMIT ?", (id, after, limit)
+            ).fetchall()
+        return [Event(row["id"], row["kind"], row["data"]) for row in rows]
+
+
+def _append(db: sqlite3.Connection, job: str, kind: str, data: str) -> None:
+    db.execute("INSERT INTO events (job, kind, data) VALUES (?,?,?)", (job, kind, data))
+
+
+def _text(name: str, value: Any) -> Any:
+    return dumps(value) if name in _JSON and value is not None else value
+
+
+def _job(row: sqlite3.Row) -> Job:
+    values = {name: row[name] for name in _COLUMNS}
+    for name in _JSON:
+        if values[name] is not None:
+            values[name] = json.loads(values[name])
+    return Job(**values)
