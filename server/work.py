@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from importlib import import_module
 from typing import Any
 
 from distributed import get_worker
@@ -32,6 +33,7 @@ class Prepared(WorkerPlugin):
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         registry.families()
         registry.algorithms()
+        import_module("engine.mission")
 
 
 def cancel(job: str) -> None:

@@ -65,7 +65,7 @@ def pane(id: str, here: Here) -> HTMLResponse:
     return HTMLResponse(relay.page(), headers=headers)
 
 
-@router.websocket("/scenes/{id}/")
+@router.websocket("/scenes/{id}")  # viser's client leaves the last slash of its own address out
 async def pane_socket(socket: WebSocket, id: str, here: Here) -> None:
     found = here.scenes.panes.get(id)
     if found is None:

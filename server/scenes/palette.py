@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 Rgb = tuple[int, int, int]
 
 VEHICLES: tuple[Rgb, ...] = (
@@ -22,6 +24,12 @@ GRID_SECTION: Rgb = (168, 189, 207)
 def vehicle(index: int) -> Rgb:
     """The colour of a mission's vehicle number `index`."""
     return VEHICLES[index % len(VEHICLES)]
+
+
+def linear(colour: Rgb) -> np.ndarray:
+    """A colour (3,) as viser takes it for the points of lines: in linear light, of which it makes sRGB itself."""
+    c = np.array(colour) / 255
+    return (255 * np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)).round().astype(np.uint8)
 
 
 def faded(colour: Rgb, share: float) -> Rgb:

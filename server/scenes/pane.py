@@ -21,7 +21,8 @@ SMALLEST = 0.02
 #: A ray is seen for this share of the mission, and at least this long.
 RAY_SHARE, RAY_S = 0.006, 3.0
 
-OBLIQUE, ABOVE = np.array([0.0, -0.82, 0.78]) * SPAN, np.array([0.0, -0.01, 1.15]) * SPAN
+OBLIQUE, ABOVE = np.array([0.0, -0.9, 1.12]) * SPAN, np.array([0.0, -0.01, 1.35]) * SPAN
+FIELD_OF_VIEW = np.radians(50.0)
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Pane:
         self._options = Options()
         self.footage: Footage
         self._chart: Chart
+        self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         scene = self.server.scene
         scene.configure_environment_map(hdri=None)
         scene.configure_default_lights(enabled=True, cast_shadow=False)
@@ -53,6 +55,7 @@ class Pane:
         scene.set_background_image(np.full((2, 2, 3), palette.WATER, dtype=np.uint8), format="png")
         self.server.initial_camera.position = tuple(OBLIQUE)
         self.server.initial_camera.look_at = (0.0, 0.0, 0.0)
+        self.server.initial_camera.fov = FIELD_OF_VIEW
 
     @property
     def port(self) -> int:
@@ -223,7 +226,7 @@ class Pane:
         shades = np.concatenate(
             [
                 np.zeros((0, 2, 3), np.uint8),
-                *(np.broadcast_to(np.array(c, np.uint8), line.shape) for line, c in zip(drawn, colours)),
+                *(np.broadcast_to(palette.linear(c), line.shape) for line, c in zip(drawn, colours)),
             ]
         ).astype(np.uint8)
         if not len(points):
