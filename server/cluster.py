@@ -40,6 +40,7 @@ class Cluster:
                     processes=True,
                     host="127.0.0.1",
                     dashboard_address=None,  # pyright: ignore[reportArgumentType]
+                    scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
                     silence_logs=logging.CRITICAL,
                     asynchronous=True,
                 )  # pyright: ignore[reportGeneralTypeIssues]
