@@ -41,7 +41,8 @@ class Innovations:
 class PacketCount:
     """Packets over all trials: broadcasts sent, receptions, encoded bytes and the floats the paper would count.
 
-    sent, received, bytes_sent, floats_sent are totals over trials; largest_bytes is the longest packet.
+    sent, received, bytes_sent, floats_sent and mission_s (the time they took) are totals over trials; largest_bytes
+    is the longest packet.
     """
 
     sent: int = 0
@@ -49,6 +50,7 @@ class PacketCount:
     bytes_sent: int = 0
     floats_sent: int = 0
     largest_bytes: int = 0
+    mission_s: float = 0.0
 
     def __add__(self, other: PacketCount) -> PacketCount:
         return PacketCount(
@@ -57,6 +59,7 @@ class PacketCount:
             self.bytes_sent + other.bytes_sent,
             self.floats_sent + other.floats_sent,
             max(self.largest_bytes, other.largest_bytes),
+            self.mission_s + other.mission_s,
         )
 
 

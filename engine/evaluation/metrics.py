@@ -72,9 +72,7 @@ def evaluate(
     }
 
 
-def _subject(
-    truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: Belief | None
-) -> SubjectMetrics:
+def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: Belief | None) -> SubjectMetrics:
     belief = tracks.beliefs[subject]
     if truth is None:
         truth = np.full((1, belief.mean.shape[1], 2), np.nan)
@@ -102,9 +100,7 @@ def _subject(
         "consistent": consistent,
         "verdict": name,
         "explanation": sentence,
-        "max_deviation_m": None
-        if benchmark is None
-        else number(_distance(belief.mean, benchmark.mean).max()),
+        "max_deviation_m": None if benchmark is None else number(_distance(belief.mean, benchmark.mean).max()),
     }
     together = correlations(subject, tracks.series)
     if together:

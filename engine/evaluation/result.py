@@ -32,6 +32,7 @@ class Result:
     tracks: dict[str, Tracks]
     truth: dict[str, np.ndarray]
     time_s: np.ndarray
+    capacity_bps: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The contents of result.json: plain types, no NaN, no infinity."""
@@ -40,7 +41,7 @@ class Result:
             "scenario": self.scenario,
             "seed": self.seed,
             "trials": self.trials,
-            "algorithms": _algorithms(self.tracks, self.metrics),
+            "algorithms": _algorithms(self.tracks, self.metrics, self.capacity_bps),
             "claims": self.claims,
         }
 
@@ -67,7 +68,7 @@ def assemble(scenario: Any, reference: Reference, tracks: Mapping[str, Tracks]) 
     known = registry.algorithms()
     centralized = next((name for name in tracks if name in known and known[name].centralized), None)
     metrics = evaluate(reference, tracks, centralized)
-    claims = check(scenario.claims, {"algorithms": _algorithms(tracks, metrics)})
+    claims = check(scenario.claims, {"algorithms": _algorithms(tracks, metrics, _capacity(scenario))})
     return Result(
         scenario=scenario.model_dump(mode="json", by_alias=True, exclude_none=True),
         seed=scenario.seed,
@@ -77,16 +78,22 @@ def assemble(scenario: Any, reference: Reference, tracks: Mapping[str, Tracks]) 
         tracks=dict(tracks),
         truth=reference.truth,
         time_s=reference.time_s,
+        capacity_bps=_capacity(scenario),
     )
 
 
+def _capacity(scenario: Any) -> float | None:
+    """What the scenario says its channel carries, bit/s; families without a network have none."""
+    return getattr(getattr(scenario, "network", None), "capacity_bps", None)
+
+
 def _algorithms(
-    tracks: Mapping[str, Tracks], metrics: Mapping[str, dict[str, SubjectMetrics]]
+    tracks: Mapping[str, Tracks], metrics: Mapping[str, dict[str, SubjectMetrics]], capacity_bps: float | None
 ) -> dict[str, dict[str, Any]]:
     return {
         name: {
             "subjects": metrics[name],
-            "packets": packet_figures(answer.packets),
+            "packets": packet_figures(answer.packets, capacity_bps),
             "cpu_s": answer.cpu_s,
             "notes": list(answer.notes),
         }
@@ -94,13 +101,20 @@ def _algorithms(
     }
 
 
-def packet_figures(packets: PacketCount) -> dict[str, float]:
-    """Packets sent and received over all trials; mean bytes and floats of one, 0 where none was sent."""
+def packet_figures(packets: PacketCount, capacity_bps: float | None = None) -> dict[str, Any]:
+    """Packets sent and received over all trials; mean bytes and floats of one, 0 where none was sent.
+
+    bits_per_second is the mean load on the shared channel; exceeds_capacity compares it with the channel's, where
+    the scenario states one.
+    """
     sent = max(packets.sent, 1)
+    load = 8 * packets.bytes_sent / packets.mission_s if packets.mission_s else 0.0
     return {
         "sent": packets.sent,
         "received": packets.received,
         "bytes_per_packet": packets.bytes_sent / sent,
         "floats_per_packet": packets.floats_sent / sent,
         "largest_bytes": packets.largest_bytes,
+        "bits_per_second": load,
+        "exceeds_capacity": None if capacity_bps is None else load > capacity_bps,
     }

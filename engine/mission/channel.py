@@ -60,7 +60,10 @@ def sound(scenario: NavigationScenario, voyages: Sequence[Voyage], trials: Seque
                 turn = np.cumsum(sender == s)[b[mine]] - 1
                 pair = (voyages[s].vehicle.name, name)
                 got[:, mine] = heard(network.loss_model, pair, turn, tol[b[mine]], distance[mine], chance[:, mine])
-        measured = np.where(got, travel + error / network.sound_speed_mps, np.nan)
+        silent = np.zeros(toa.shape, dtype=bool)
+        for stretch in network.silences:
+            silent |= (toa >= stretch.start_s) & (toa <= stretch.end_s)
+        measured = np.where(got & ~silent, travel + error / network.sound_speed_mps, np.nan)
         columns.append((b, np.full(len(b), r), toa, measured))
 
     if not columns:
@@ -146,7 +149,7 @@ def heard(
     draw = chance[..., 0]
     match loss:
         case FixedLoss():
-            return draw >= loss.rate
+            return draw >= loss.of(*pair)
         case RangeLoss():
             through = (1 - loss.floor) * _logistic((loss.half_range_m - distance) / loss.width_m)
             return draw < through

@@ -153,7 +153,8 @@ def run_nodes(
         curves=curves,
     )
     notes = [f"{m.log.name}: {n}" for m, node in zip(members(mission), nodes) for n in node.notes()]
-    return recorder.tracks(sum(counts, PacketCount()), notes)
+    time = PacketCount(mission_s=mission.trials * mission.log.duration_s)
+    return recorder.tracks(sum(counts, time), notes)
 
 
 def run_fleet(mission: NavigationMission, progress: Progress, make: Callable[[list[Member]], Fleet]) -> Tracks:

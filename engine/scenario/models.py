@@ -59,6 +59,19 @@ def faults(problems: list[Problem]) -> PydanticCustomError:
     return PydanticCustomError("problems", text, {"problems": problems})  # type: ignore[arg-type]
 
 
+class Interval(Table):
+    """A stretch of mission time, s."""
+
+    start_s: NotNegative = Field(description="start, s from the start of the mission")
+    end_s: Positive = Field(description="end, s from the start of the mission")
+
+    @model_validator(mode="after")
+    def _forward(self) -> Interval:
+        if self.end_s <= self.start_s:
+            raise faults([Problem("end_s", f"is not after start_s ({self.start_s:g})", "give a later time")])
+        return self
+
+
 class Than(Table):
     """Another metric to compare a claim's metric with."""
 

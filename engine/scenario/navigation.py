@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from engine.scenario.errors import Problem
 from engine.scenario.models import Positive, ScenarioBase, faults
-from engine.scenario.network import Network, RecordedLoss
+from engine.scenario.network import FixedLoss, Network, RecordedLoss
 from engine.scenario.recording import CsvRecording, PyfgRecording, Simulated
 from engine.scenario.vehicles import Vehicle
 
@@ -121,7 +121,7 @@ def _network(scenario: NavigationScenario):
                 )
         if not simulated:
             yield Problem("network.tdma", "a recorded mission has its own broadcasts", "leave it out")
-    if isinstance(network.loss, RecordedLoss):
+    if isinstance(network.loss, RecordedLoss | FixedLoss):
         for i, heard in enumerate(network.loss.links):
             yield from _unknown(scenario, f"network.loss.links[{i}].sender", heard.sender)
             yield from _unknown(scenario, f"network.loss.links[{i}].receiver", heard.receiver)

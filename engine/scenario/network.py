@@ -6,14 +6,28 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from engine.scenario.models import Fraction, NotNegative, Positive, Table
+from engine.scenario.models import Fraction, Interval, NotNegative, Positive, Table
+
+
+class LinkRate(Table):
+    """A loss rate of one directed link."""
+
+    sender: str = Field(description="name of the vehicle that sends")
+    receiver: str = Field(description="name of the vehicle that listens")
+    rate: Fraction = Field(description="fraction of packets lost")
 
 
 class FixedLoss(Table):
-    """Every packet is lost with the same probability."""
+    """Every packet is lost with the same probability, but for the links named."""
 
     kind: Literal["fixed"]
     rate: Fraction = Field(description="fraction of packets lost")
+    links: list[LinkRate] = Field([], max_length=4096, description="directed links with a rate of their own")
+
+    def of(self, sender: str, receiver: str) -> float:
+        """The rate of one directed link."""
+        own = [entry.rate for entry in self.links if (entry.sender, entry.receiver) == (sender, receiver)]
+        return own[0] if own else self.rate
 
 
 class RangeLoss(Table):
@@ -115,9 +129,13 @@ class Network(Table):
         "all", description='directed pairs ["from", "to"] that may hear, or "all"'
     )
     loss: Loss = Field(0.0, description="fraction of packets lost, or a loss model")
+    silences: list[Interval] = Field([], max_length=1000, description="stretches in which nobody hears anything")
+    capacity_bps: Positive | None = Field(
+        None, description="what the channel carries, bit/s; a run that needs more on average is marked"
+    )
     tdma: Tdma | None = Field(None, description="who broadcasts when; without it nobody does")
 
     @property
     def loss_model(self) -> LossModel:
         """The loss as a model, also where the file has a plain number."""
-        return FixedLoss(kind="fixed", rate=self.loss) if isinstance(self.loss, float) else self.loss
+        return FixedLoss(kind="fixed", rate=self.loss, links=[]) if isinstance(self.loss, float) else self.loss

@@ -7,25 +7,12 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from engine.scenario.errors import Problem
-from engine.scenario.models import Coordinate, Fraction, Name, NotNegative, Point, Positive, Table, faults
+from engine.scenario.models import Coordinate, Fraction, Interval, Name, NotNegative, Point, Table, faults
 from engine.scenario.paths import Path
 
 Rate = Annotated[float, Field(gt=0, le=1000)]
 Sigma = Annotated[float, Field(gt=0, le=1e5)]
 Degrees = Annotated[float, Field(gt=0, le=180)]
-
-
-class Interval(Table):
-    """A stretch of mission time, s."""
-
-    start_s: NotNegative = Field(description="start, s from the start of the mission")
-    end_s: Positive = Field(description="end, s from the start of the mission")
-
-    @model_validator(mode="after")
-    def _forward(self) -> Interval:
-        if self.end_s <= self.start_s:
-            raise faults([Problem("end_s", f"is not after start_s ({self.start_s:g})", "give a later time")])
-        return self
 
 
 class Initial(Table):

@@ -33,9 +33,7 @@ RESULT = {
 }
 
 
-def claim(
-    metric: str, algorithm: str, subject: str | None, operator: str, bound: Any = None, than: Any = None
-):
+def claim(metric: str, algorithm: str, subject: str | None, operator: str, bound: Any = None, than: Any = None):
     other = SimpleNamespace(**than) if than else None
     return SimpleNamespace(
         text="so it is said",
@@ -112,9 +110,7 @@ def test_a_comparison_with_what_was_not_run_is_open_and_keeps_its_value():
         ("correlation", "iver", "==", 1, "cannot be compared"),
     ],
 )
-def test_a_claim_on_a_figure_that_does_not_exist_fails_with_a_reason(
-    metric, subject, operator, bound, reason
-):
+def test_a_claim_on_a_figure_that_does_not_exist_fails_with_a_reason(metric, subject, operator, bound, reason):
     [found] = check([claim(metric, "cekf", subject, operator, bound)], RESULT)
     assert found["holds"] is False
     assert reason in found["reason"]

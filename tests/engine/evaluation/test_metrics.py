@@ -122,9 +122,7 @@ def test_the_gate_counts_what_was_heard_and_averages_what_was_accepted():
 
 
 def test_a_vehicle_that_heard_nothing_has_no_mean_nis():
-    nothing = Innovations(
-        np.array([1.0]), np.full((1, 1), np.nan), np.full((1, 1), np.nan), np.zeros((1, 1), bool)
-    )
+    nothing = Innovations(np.array([1.0]), np.full((1, 1), np.nan), np.full((1, 1), np.nan), np.zeros((1, 1), bool))
     assert gate(nothing) == {"offered": 0, "accepted": 0, "mean_nis": None, "nis_interval": None}
 
 
