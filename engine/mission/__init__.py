@@ -20,4 +20,4 @@ def fly(scenario: NavigationScenario, trials: Sequence[int], *, logs: Sequence[P
         return simulate(scenario, trials)
     from engine.mission.recorded import read
 
-    return read(scenario, len(trials), logs)
+    return read(scenario, trials, logs)

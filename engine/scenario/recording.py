@@ -137,6 +137,7 @@ class RangesFile(Table):
     broadcast: Column | None = Field(None, description="column of the number of the broadcast")
     names: dict[str, str] = Field({}, description="what stands in the columns -> name of the vehicle")
     ignore: list[str] = Field([], description="what to pass over in the sender and receiver columns")
+    sort: bool = Field(False, description="put the rows in order of time; without it, an unsorted file is an error")
 
     @model_validator(mode="after")
     def _complete(self) -> RangesFile:
