@@ -35,6 +35,9 @@ def parser() -> argparse.ArgumentParser:
     _scenario(run)
     run.add_argument("--algorithms", type=_names, metavar="A,B", help="algorithms to run instead of the scenario's")
     run.add_argument("--out", type=Path, metavar="DIR", help="write result.json and arrays.npz here")
+    run.add_argument(
+        "--sweep", metavar="KEY=A:B:STEP", help="run once for each value of a key, as network.loss=0:0.9:0.1"
+    )
     run.add_argument("--workers", type=_count, metavar="N", help="processes to use (default: one per core)")
     run.set_defaults(run=commands.run)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from engine import registry, runner
+from engine import registry, runner, sweep
 from engine.evaluation.result import Result
 from engine.scenario import library, toml
 from engine.scenario.models import ScenarioBase
@@ -44,6 +44,8 @@ def run(chosen: Namespace) -> int:
     runner.chosen(scenario, chosen.algorithms)
     if chosen.out is not None and chosen.out.exists() and not chosen.out.is_dir():
         raise Usage(f"--out {chosen.out} is a file; name a folder")
+    if chosen.sweep is not None:
+        return _sweep(scenario, chosen)
     result = _run(scenario, chosen.algorithms, chosen.workers)
     print(f"{scenario.title} ({result.trials} trial{'s' * (result.trials != 1)}, seed {result.seed})")
     told = result.to_json()
@@ -148,15 +150,43 @@ def _wanted(chosen: Namespace) -> ScenarioBase:
     return toml.override(scenario, changes) if changes else scenario
 
 
+def _sweep(scenario: ScenarioBase, chosen: Namespace) -> int:
+    """Run the scenario at every value of a key, print the curves as a table, write each result where asked."""
+    from server import artifacts
+
+    wanted = sweep.parse(chosen.sweep)
+    results = []
+    with _bar() as bar:
+        for value, result in sweep.run(
+            scenario, wanted, chosen.algorithms, workers=chosen.workers, progress=lambda f: _fill(bar, f)
+        ):
+            told = result.to_json()
+            results.append((value, told))
+            if chosen.out is not None:
+                artifacts.write_result(chosen.out / f"{wanted.key}={value:g}", result)
+        _fill(bar, 1.0)
+    print(f"{scenario.title}: {wanted.key} ({scenario.trials} trials each, seed {scenario.seed})")
+    print("\n".join(table.lines(*table.curves(wanted.key, results), left=3)))
+    if chosen.out is not None:
+        curves = sweep.summary(wanted.key, results)
+        artifacts.write_text(chosen.out / "sweep.json", json.dumps(curves, indent=1, allow_nan=False))
+        print(f"written to {chosen.out}", file=sys.stderr)
+    return 0
+
+
 def _run(scenario: ScenarioBase, algorithms: Sequence[str] | None, workers: int | None) -> Result:
-    with tqdm(total=100, unit="%", bar_format="{desc}{percentage:3.0f}% |{bar}| {elapsed}", file=sys.stderr) as bar:
-
-        def progress(fraction: float) -> None:
-            bar.update(max(0.0, 100 * fraction - bar.n))
-
-        result = runner.run(scenario, algorithms, workers=workers, progress=progress)
-        bar.update(100 - bar.n)
+    with _bar() as bar:
+        result = runner.run(scenario, algorithms, workers=workers, progress=lambda f: _fill(bar, f))
+        _fill(bar, 1.0)
     return result
+
+
+def _bar() -> tqdm:
+    return tqdm(total=100, unit="%", bar_format="{desc}{percentage:3.0f}% |{bar}| {elapsed}", file=sys.stderr)
+
+
+def _fill(bar: tqdm, fraction: float) -> None:
+    bar.update(max(0.0, 100 * fraction - bar.n))
 
 
 def _claim(claim: dict[str, Any]) -> str:

@@ -5,11 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-HEADER = ["algorithm", "subject", "RMSE m", "final m", "sigma m", "ANEES", "verdict", "packets", "bytes each", "CPU s"]
+HEADER = [
+    "algorithm",
+    "subject",
+    "RMSE m",
+    "final m",
+    "sigma m",
+    "ANEES",
+    "verdict",
+    "packets",
+    "bytes each",
+    "bit/s",
+    "CPU s",
+]
 
 
 def figures(result: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
-    """Header and one row for each algorithm and subject of a result.json."""
+    """Header and one row for each algorithm and subject of a result.json; "!" marks a load beyond the channel's."""
     rows = []
     for name, answer in result["algorithms"].items():
         for n, (subject, m) in enumerate(answer["subjects"].items()):
@@ -22,9 +34,32 @@ def figures(result: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
                 m.get("verdict") or {True: "consistent", False: "overconfident", None: "-"}[m["consistent"]],
             ]
             packets = answer["packets"]
-            shared = [number(packets["sent"]), number(packets["bytes_per_packet"]), number(answer["cpu_s"])]
-            rows.append([name if n == 0 else "", *own, *(shared if n == 0 else [""] * 3)])
+            load = number(packets["bits_per_second"]) + ("!" if packets["exceeds_capacity"] else "")
+            shared = [number(packets["sent"]), number(packets["bytes_per_packet"]), load, number(answer["cpu_s"])]
+            rows.append([name if n == 0 else "", *own, *(shared if n == 0 else [""] * len(shared))])
     return HEADER, rows
+
+
+def curves(key: str, results: Sequence[tuple[float, dict[str, Any]]]) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of a sweep: the swept value, then algorithm and subject with their figures."""
+    header = [key, "algorithm", "subject", "RMSE m", "sigma m", "ANEES", "interval", "verdict", "bit/s"]
+    rows = []
+    for value, result in results:
+        for name, answer in result["algorithms"].items():
+            for subject, m in answer["subjects"].items():
+                bounds = m["anees_interval"]
+                rows.append(
+                    [
+                        f"{value:g}",
+                        name,
+                        subject,
+                        *(number(m[figure]) for figure in ("rmse_m", "sigma_m", "anees")),
+                        "-" if bounds is None else f"{bounds[0]:.2f}..{bounds[1]:.2f}",
+                        str(m.get("verdict", "-")),
+                        number(answer["packets"]["bits_per_second"]),
+                    ]
+                )
+    return header, rows
 
 
 def number(value: float | None) -> str:
