@@ -243,6 +243,7 @@ def _ranges(rows: Sheet, source: RangesFile, scenario: NavigationScenario, offse
     receivers = _who(rows, source, source.receiver, source.receiver_column, scenario)
     numbers = rows.text(source.broadcast) if source.broadcast is not None else [str(i) for i in range(count)]
     order: dict[str, int] = {}
+    launched: dict[int, tuple[str, float]] = {}
     found = []
     for i in range(count):
         sender, receiver = senders[i], receivers[i]
@@ -257,6 +258,9 @@ def _ranges(rows: Sheet, source: RangesFile, scenario: NavigationScenario, offse
                 i, source.sender_column or source.receiver_column or "", f"{sender!r} hears itself", "drop it"
             )
         number = offset + order.setdefault(numbers[i], len(order))
+        if launched.setdefault(number, (sender, tol[i])) != (sender, tol[i]):
+            message = f"broadcast {numbers[i][:40]!r} has another sender or time of launch above"
+            raise rows.fault(i, source.broadcast or "", message, "number every broadcast once")
         found.append(Reception(number, sender, float(tol[i]), receiver or None, float(toa[i]), float(travel[i])))
     return found
 
