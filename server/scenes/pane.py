@@ -199,9 +199,11 @@ class Pane:
         """Go along with the vehicle that is followed; look from above, or obliquely again, when asked."""
         clients = list(self.server.get_clients().values())
         if options.top != self._options.top:
-            for client in clients:
-                client.camera.look_at = np.zeros(3)
-                client.camera.position = ABOVE if options.top else OBLIQUE
+            place = ABOVE if options.top else OBLIQUE
+            for camera in (self.server.initial_camera, *(client.camera for client in clients)):
+                # Moving a camera moves what it looks at along with it: position first.
+                camera.position = tuple(place)
+                camera.look_at = (0.0, 0.0, 0.0)
         target = now.get(options.follow) if options.follow else None
         if target is None or not np.isfinite(target).all():
             self._followed = None
