@@ -1,0 +1,86 @@
+// Puts the page together: reads the library, follows the address, connects panes to their scenes.
+
+import { listenKeys } from "./keyboard.js";
+import { mountAlgorithms } from "./library/algorithms.js";
+import { mountLaunch } from "./library/launch.js";
+import { mountMissions } from "./library/missions.js";
+import { mountPreview } from "./library/preview.js";
+import { part } from "./look/dom.js";
+import { mountNotices } from "./notices.js";
+import { mountRuns } from "./runs/runs.js";
+import { clock } from "./state/clock.js";
+import { suspect } from "./state/connection.js";
+import { readLibrary } from "./state/library.js";
+import { readLink, writeLink } from "./state/link.js";
+import { closeRun, openRun } from "./state/run.js";
+import { store } from "./state/store.js";
+import { mountTabs } from "./tabs.js";
+import { SceneSession } from "./wire/scenes.js";
+import { mountClaims } from "./workbench/claims.js";
+import { mountHeadline } from "./workbench/headline.js";
+import { MOST_PANES, hasWebGL, mountPanes } from "./workbench/panes.js";
+import { mountPlots } from "./workbench/plots.js";
+import { mountTable } from "./workbench/table.js";
+import { mountTimeline } from "./workbench/timeline.js";
+import { mountToolbar } from "./workbench/toolbar.js";
+
+/** The address is written at most this often while time runs. */
+const LINK_PAUSE_MS = 400;
+
+mountTabs();
+mountNotices();
+mountMissions();
+mountAlgorithms();
+mountLaunch();
+mountPreview();
+mountHeadline();
+
+const panes = mountPanes(listenKeys);
+const session = new SceneSession({
+  scenes: (addresses) => panes.place(addresses),
+  error: (detail) => panes.fail(detail),
+  link: (up) => (up ? store.set({ connected: true }) : suspect()),
+});
+mountToolbar(session);
+mountTimeline();
+mountPlots();
+mountTable();
+mountClaims();
+mountRuns();
+listenKeys(window);
+
+store.watch(["run"], ({ run }) => (part("workbench").hidden = run === null));
+
+let shown = null;
+store.watch(["job"], ({ job }) => {
+  if (!hasWebGL || (job?.id ?? null) === shown) return;
+  shown = job?.id ?? null;
+  if (job) session.show(job.id, job.algorithms.slice(0, MOST_PANES));
+});
+clock.watch(() => {
+  if (shown !== null && clock.end > clock.start && !clock.following) session.seek(clock.time);
+});
+
+let writing = 0;
+const write = () => {
+  writing ||= setTimeout(() => {
+    writing = 0;
+    const { run, vehicle } = store.state;
+    if (run === null || store.state.view) writeLink({ run, time_s: clock.following ? null : clock.time, vehicle });
+    else if (readLink().run !== run) writeLink({ run, time_s: null, vehicle });
+  }, LINK_PAUSE_MS);
+};
+clock.watch(write);
+
+function followLink() {
+  const { run, time_s, vehicle } = readLink();
+  if (run && run !== store.state.run) openRun(run, { time_s, vehicle });
+  else if (!run && store.state.run !== null) closeRun();
+  else if (run && time_s !== null) clock.seek(time_s);
+}
+window.addEventListener("hashchange", followLink);
+window.addEventListener("popstate", followLink);
+followLink();
+store.watch(["run", "vehicle", "view"], write);
+
+await readLibrary();

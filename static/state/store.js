@@ -1,0 +1,60 @@
+// What the page knows; modules watch the parts they draw.
+
+/**
+ * A store of named values. `watch(names, draw)` draws now and whenever one of them has changed,
+ * once per turn of the event loop however many changes there were.
+ */
+export function createStore(initial) {
+  const state = { ...initial };
+  const watchers = [];
+  let changed = new Set();
+
+  function flush() {
+    const names = changed;
+    changed = new Set();
+    for (const { among, draw } of watchers) if (among.some((name) => names.has(name))) draw(state);
+  }
+
+  return {
+    state,
+    set(values) {
+      for (const [name, value] of Object.entries(values)) {
+        if (!(name in state)) throw new Error(`the store has no value ${name}`);
+        if (Object.is(state[name], value)) continue;
+        state[name] = value;
+        if (!changed.size) queueMicrotask(flush);
+        changed.add(name);
+      }
+    },
+    watch(among, draw) {
+      watchers.push({ among, draw });
+      draw(state);
+    },
+  };
+}
+
+export const store = createStore({
+  /** Entries of the library and the installed algorithms; null until they have come. */
+  missions: null,
+  algorithms: null,
+  /** Name of the mission picked, its scenario once read, and the names of the ticked algorithms. */
+  mission: null,
+  scenario: null,
+  ticked: [],
+  /** The run that is open: its id from the address on, its job, view and result as they arrive. */
+  run: null,
+  job: null,
+  progress: null,
+  live: null,
+  view: null,
+  result: null,
+  /** The subject that curves and readings are about. */
+  vehicle: null,
+  /** Earlier runs, newest first; null until they have come. */
+  jobs: null,
+  /** Whether the server answers. */
+  connected: true,
+  /** The last refusal of a submission (Problem), and messages about the open run [{tone, title, text, …}]. */
+  refusal: null,
+  notices: [],
+});

@@ -1,0 +1,70 @@
+// The server's REST interface; every refusal becomes a Problem, a server out of reach Unreachable.
+
+/** problem+json as an error: status, title, detail, and errors [{key, message, remedy}]. */
+export class Problem extends Error {
+  constructor({ status = 0, title = "Something went wrong", detail = "", errors = [] }) {
+    super(detail || title);
+    Object.assign(this, { name: "Problem", status, title, detail, errors });
+  }
+}
+
+/** No answer at all. */
+export class Unreachable extends Error {
+  constructor() {
+    super("The server does not answer.");
+    this.name = "Unreachable";
+  }
+}
+
+/** The problem an unsuccessful response tells of. */
+export async function problemOf(response) {
+  let body = {};
+  try {
+    body = await response.json();
+  } catch {
+    body = { detail: `The server answered ${response.status} ${response.statusText}.` };
+  }
+  const known = body !== null && typeof body === "object" ? body : {};
+  return new Problem({ ...known, status: response.status, errors: Array.isArray(known.errors) ? known.errors : [] });
+}
+
+async function request(path, { method = "GET", body, headers = {}, signal } = {}) {
+  let response;
+  try {
+    response = await fetch(path, {
+      method,
+      signal,
+      headers: body === undefined ? headers : { "content-type": "application/json", ...headers },
+      body: body === undefined ? undefined : JSON.stringify(body),
+    });
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Unreachable();
+  }
+  if (!response.ok) throw await problemOf(response);
+  return response.status === 204 ? null : response.json();
+}
+
+const job = (id) => `/api/jobs/${encodeURIComponent(id)}`;
+
+export const health = (signal) => request("/api/health", { signal });
+export const algorithms = () => request("/api/algorithms");
+export const scenarios = () => request("/api/scenarios");
+export const scenario = (name, signal) => request(`/api/scenarios/${encodeURIComponent(name)}`, { signal });
+export const jobs = () => request("/api/jobs");
+export const findJob = (id, signal) => request(job(id), { signal });
+export const view = (id, signal) => request(`${job(id)}/view`, { signal });
+export const result = (id, signal) => request(`${job(id)}/result`, { signal });
+export const cancel = (id) => request(`${job(id)}/cancel`, { method: "POST" });
+export const remove = (id) => request(job(id), { method: "DELETE" });
+export const eventsPath = (id) => `${job(id)}/events`;
+
+/** Submits a job; the key makes a repeated submission the same job. */
+export function submit(body, key) {
+  return request("/api/jobs", { method: "POST", body, headers: { "idempotency-key": key } });
+}
+
+/** A key that no other submission has. */
+export function newKey() {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (b) => b.toString(16).padStart(2, "0")).join("");
+}

@@ -1,0 +1,57 @@
+// Above the panes: whose curves to read, and what the panes draw.
+
+import { el, part } from "../look/dom.js";
+import { vehicleColour } from "../look/palette.js";
+import { dot } from "../look/swatch.js";
+import { store } from "../state/store.js";
+
+const OPTIONS = {
+  trails: { label: "Trails", on: true, hint: "Estimated tracks up to now" },
+  ellipses: { label: "Ellipses", on: true, hint: "95 % ellipses along the track" },
+  rays: { label: "Rays", on: true, hint: "Packets: the sender's colour when heard, grey when lost" },
+  follow: { label: "Follow", on: false, hint: "Keep the chosen vehicle in the middle" },
+  top: { label: "From above", on: false, hint: "Look straight down, north up" },
+};
+
+export function mountToolbar(session) {
+  const vehicles = el("div", { class: "vehicles", role: "radiogroup", "aria-label": "Vehicle" });
+  const boxes = {};
+  const tell = () => {
+    const chosen = Object.fromEntries(Object.entries(boxes).map(([name, box]) => [name, box.checked]));
+    session.options({ ...chosen, follow: chosen.follow ? store.state.vehicle : null });
+  };
+  const toggles = Object.entries(OPTIONS).map(([name, { label, on, hint }]) => {
+    boxes[name] = el("input", { type: "checkbox", name: `pane-${name}`, checked: on, onchange: tell });
+    return el("label", { class: "toggle", title: hint }, boxes[name], label);
+  });
+  part("toolbar").append(vehicles, key(), el("div", { class: "toggles", role: "group", "aria-label": "Panes show" }, toggles));
+
+  let drawn = "";
+  store.watch(["view", "live", "vehicle"], ({ view, live, vehicle }) => {
+    const streamed = Object.values(live?.algorithms ?? {})[0]?.subjects ?? {};
+    const subjects = view?.subjects ?? Object.keys(streamed).map((name) => ({ name }));
+    const wanted = JSON.stringify(subjects);
+    if (wanted !== drawn) {
+      drawn = wanted;
+      vehicles.replaceChildren(...subjects.map(choice));
+    }
+    for (const input of vehicles.querySelectorAll("input")) input.checked = input.value === vehicle;
+  });
+  store.watch(["vehicle"], () => boxes.follow.checked && tell());
+}
+
+function choice({ name, kind }, n) {
+  const hint = { auv: "AUV", surface: "surface craft", fixed: "fixed node" }[kind] ?? "vehicle";
+  return el(
+    "label",
+    { class: "vehicle", title: `${name} (${hint}): curves and readings are about it` },
+    el("input", { type: "radio", name: "vehicle", value: name, onchange: () => store.set({ vehicle: name }) }),
+    dot(vehicleColour(n)),
+    name,
+  );
+}
+
+function key() {
+  const line = (kind, text) => el("span", { class: "key" }, el("i", { class: kind, "aria-hidden": "true" }), text);
+  return el("div", { class: "keys" }, line("truth", "truth"), line("estimate", "estimate"), line("ellipse", "95 %"));
+}
