@@ -8,6 +8,7 @@ import secrets
 from collections.abc import Callable
 from typing import Any
 
+import dask.config
 from distributed import Client, LocalCluster
 
 from engine.runner import Shard
@@ -16,6 +17,28 @@ from server import work
 from server.settings import Settings
 
 log = logging.getLogger(__name__)
+
+
+#: Dask makes glibc give memory back at once, which costs arrays of many megabytes a third of their speed.
+MEMORY = {
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
+}
+
+
+async def _own_cluster(workers: int) -> LocalCluster:
+    """Worker processes of our own that listen on loopback alone and show no dashboard."""
+    with dask.config.set(MEMORY):
+        return await LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,  # pyright: ignore[reportArgumentType]
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            silence_logs=logging.CRITICAL,
+            asynchronous=True,
+        )  # pyright: ignore[reportGeneralTypeIssues]
 
 
 class Cluster:
@@ -34,16 +57,7 @@ class Cluster:
         try:
             address: Any = self._settings.cluster
             if address is None:
-                address = self._own = await LocalCluster(
-                    n_workers=self._settings.workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    host="127.0.0.1",
-                    dashboard_address=None,  # pyright: ignore[reportArgumentType]
-                    scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-                    silence_logs=logging.CRITICAL,
-                    asynchronous=True,
-                )  # pyright: ignore[reportGeneralTypeIssues]
+                address = self._own = await _own_cluster(self._settings.workers)
             self._client = await Client(address, asynchronous=True, name="coopnav")  # pyright: ignore
             await self._client.register_plugin(work.Prepared())  # pyright: ignore
             self._client.subscribe_topic(self._topic, lambda event: hear(event[1]))

@@ -15,6 +15,7 @@ from engine import registry, runner, sweep
 from engine.evaluation.result import Result
 from engine.scenario import library, toml
 from engine.scenario.models import ScenarioBase
+from engine.scenario.navigation import NavigationScenario
 from server import table
 
 
@@ -89,6 +90,8 @@ def log(chosen: Namespace) -> int:
     from engine.mission import csv_log, fly
 
     scenario = _wanted(chosen)
+    if not isinstance(scenario, NavigationScenario):
+        raise Usage(f"{chosen.scenario} is a {scenario.family} mission; only navigation missions have logs")
     if chosen.out.exists() and not chosen.out.is_dir():
         raise Usage(f"--out {chosen.out} is a file; name a folder")
     csv_log.write(fly(scenario, [0]), scenario, chosen.out)

@@ -194,7 +194,7 @@ class Session:
             wanted = self._chart if self._chart and new.truth else chart(new.points(), deepest)
             if self._chart is None or wanted != self._chart:
                 self._chart = wanted
-                await asyncio.to_thread(self._stage_panes, new, wanted)
+                await _undisturbed(self._stage_panes, new, wanted)
             else:
                 for _, pane in self._panes.values():
                     pane.footage = new
@@ -214,7 +214,7 @@ class Session:
                     continue
                 moment = self._footage.latest_s if self._moment is None else self._moment
                 try:
-                    await asyncio.to_thread(self._show_panes, moment)
+                    await _undisturbed(self._show_panes, moment)
                 except Exception:
                     log.exception("a 3D pane could not be drawn")
                     await self._send({"type": "error", "detail": BROKEN})
@@ -224,3 +224,13 @@ class Session:
     def _show_panes(self, moment: float) -> None:
         for name, (_, pane) in self._panes.items():
             pane.show(name, moment, self._options)
+
+
+async def _undisturbed(draw: Callable[..., None], *arguments: Any) -> None:
+    """Run in a thread to its end, even when cancelled: a pane must not be closed under the pen."""
+    drawing = asyncio.ensure_future(asyncio.to_thread(draw, *arguments))
+    try:
+        await asyncio.shield(drawing)
+    except asyncio.CancelledError:
+        await asyncio.wait([drawing])
+        raise

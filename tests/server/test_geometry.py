@@ -1,0 +1,55 @@
+"""Metres to the scene."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.scenes.footage import at
+from server.scenes.geometry import CORNERS, SPAN, Chart, chart, ellipses, round_length, segments
+
+UNIT = Chart(np.zeros(2), 1.0, 1.0)
+
+
+@given(st.floats(0.1, 50), st.floats(0.1, 50), st.floats(-0.95, 0.95))
+def test_the_ellipse_is_the_95_percent_contour(sx: float, sy: float, rho: float):
+    """Every corner has the squared Mahalanobis distance 5.991, the chi-square quantile for two degrees."""
+    cov = np.array([[sx * sx, rho * sx * sy], [rho * sx * sy, sy * sy]])
+    drawn = ellipses(UNIT, np.array([[3.0, -2.0]]), np.array([[cov[0, 0], cov[0, 1], cov[1, 1]]]), 0.0)
+    corners = drawn[0, :, 0, :2] - np.array([3.0, -2.0])
+    distance = np.einsum("ki,ij,kj->k", corners, np.linalg.inv(cov), corners)
+    np.testing.assert_allclose(distance, 5.991464547107979, rtol=1e-6)
+    assert drawn.shape == (1, CORNERS, 2, 3)
+
+
+def test_an_ellipse_that_is_not_finite_is_left_out():
+    drawn = ellipses(UNIT, np.zeros((3, 2)), np.array([[1.0, 0, 1], [np.nan, 0, 1], [1, 0, np.inf]]), 0.0)
+    assert len(drawn) == 1
+
+
+def test_a_mission_fills_the_scene_and_depth_goes_down():
+    where = chart(np.array([[100.0, 0.0], [1100.0, 400.0], [np.nan, 1e9]]), deepest_m=20.0)
+    corners = where.place(np.array([[100.0, 0.0], [1100.0, 400.0]]), depth_m=20.0)
+    np.testing.assert_allclose(corners[:, 0], [-SPAN / 2, SPAN / 2])
+    np.testing.assert_allclose(corners[:, 2], -0.7)
+    assert chart(np.zeros((0, 2)), 0.0).scale == SPAN / 1000
+
+
+def test_segments_leave_gaps_where_nothing_is_known():
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [np.nan, 0, 0], [3, 0, 0], [4, 0, 0]])
+    assert segments(line).tolist() == [[[0, 0, 0], [1, 0, 0]], [[3, 0, 0], [4, 0, 0]]]
+
+
+@pytest.mark.parametrize(("metres", "round_"), [(1.0, 1), (1.9, 1), (4.99, 2), (50, 50), (73, 50), (999, 500)])
+def test_grid_cells_are_round_lengths(metres: float, round_: float):
+    assert round_length(metres) == pytest.approx(round_)
+
+
+def test_positions_between_reports_are_interpolated_and_held_at_the_ends():
+    time_s, rows = np.array([0.0, 10.0]), np.array([[0.0, 0.0], [10.0, 20.0]])
+    assert at(time_s, rows, 5.0).tolist() == [5.0, 10.0]
+    assert at(time_s, rows, -1.0).tolist() == [0.0, 0.0]
+    assert at(time_s, rows, 99.0).tolist() == [10.0, 20.0]
+    assert np.isnan(at(np.zeros(0), np.zeros((0, 2)), 1.0)).all()

@@ -1,0 +1,211 @@
+"""3D panes over the wire: a session, its panes' pages, and the relay to viser."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import msgspec
+import pytest
+import viser
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from server.scenes import relay
+from tests.server.living import PATIENCE_S, SHORT, Live, until
+
+
+class Session:
+    """A browser's end of the session websocket."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+
+    def say(self, **message: Any) -> None:
+        self.socket.send(json.dumps(message))
+
+    def hear(self, kind: str) -> dict[str, Any]:
+        """The next message of a kind; those of other kinds are passed over."""
+        while True:
+            message = json.loads(self.socket.recv(timeout=PATIENCE_S))
+            if message["type"] == kind:
+                return message
+            assert message["type"] != "error", message
+
+    def show(self, job: str, *panes: str) -> dict[str, str]:
+        self.say(type="show", job=job, panes=panes)
+        return self.hear("scenes")["panes"]
+
+
+@contextmanager
+def session(live: Live) -> Iterator[Session]:
+    with connect(f"{live.ws}/api/scenes/session", origin=live.url) as socket:
+        yield Session(socket)
+
+
+@contextmanager
+def viewer(live: Live, path: str) -> Iterator[ClientConnection]:
+    """What viser's client does: it leaves the last slash out."""
+    protocol = f"viser-v{viser.__version__}"
+    with connect(live.ws + path.rstrip("/"), subprotocols=[protocol], origin=live.url, max_size=None) as socket:
+        assert socket.subprotocol == protocol
+        yield socket
+
+
+@pytest.fixture(scope="module")
+def job(live: Live) -> str:
+    return live.done(SHORT)["id"]
+
+
+def test_every_pane_has_its_own_page_and_scene(live: Live, job: str):
+    with session(live) as mine:
+        panes = mine.show(job, "cekf", "nekf")
+        assert len(set(panes.values())) == 2
+        mine.say(type="seek", time_s=60.0)
+        until(lambda: mine.hear("at")["time_s"] == 60.0, "the moment asked for")
+        for path in panes.values():
+            page = live.http.get(path)
+            assert page.status_code == 200 and "document.hasFocus" in page.text
+            with viewer(live, path) as socket:
+                assert isinstance(socket.recv(timeout=PATIENCE_S), bytes)
+
+
+def test_what_a_pane_is_sent_holds_the_tracks_the_ellipses_and_the_vehicles(live: Live, job: str):
+    with session(live) as mine:
+        path = mine.show(job, "nekf")["nekf"]
+        mine.say(type="seek", time_s=100.0)
+        until(lambda: mine.hear("at")["time_s"] == 100.0, "the moment asked for")
+        server = live.app.state.site.scenes.panes[path.split("/")[2]].server
+        for name in (
+            "/surface",
+            "/truth",
+            "/trails",
+            "/ellipses",
+            "/present",
+            "/rays",
+            "/vehicle/0",
+            "/vehicle/1/name",
+        ):
+            assert server.scene.get_handle_by_name(name) is not None, name
+        trail = server.scene.get_handle_by_name("/trails").points
+        before = len(trail)
+        mine.say(type="seek", time_s=20.0)
+        until(lambda: mine.hear("at")["time_s"] == 20.0, "the moment asked for")
+        assert 0 < len(server.scene.get_handle_by_name("/trails").points) < before
+
+
+def test_the_panes_of_a_running_job_grow(live: Live):
+    with session(live) as mine:
+        id = live.submit(SHORT | {"set": {"duration_s": 600}, "trials": 100})["id"]
+        mine.show(id, "cekf")
+        times = [mine.hear("at")["time_s"]]
+        until(lambda: times.append(mine.hear("at")["time_s"]) or times[-1] == 600.0, "the last estimate")
+        assert times == sorted(times)
+        live.finished(id)
+
+
+def test_a_viewer_may_move_its_camera_and_nothing_else(live: Live, job: str):
+    assert relay.permitted(msgspec.msgpack.encode({"type": "ViewerCameraMessage"}))
+    for kind in ("ShareUrlRequest", "ShareUrlDisconnect", "GuiUpdateMessage", "FileTransferStartUpload", None, 1):
+        assert not relay.permitted(msgspec.msgpack.encode({"type": kind}))
+    for junk in (b"", b"\xc1", b"\x91" * 5000, msgspec.msgpack.encode([1]), msgspec.msgpack.encode("x")):
+        assert not relay.permitted(junk)
+
+
+def test_a_request_for_a_public_tunnel_does_not_get_through(live: Live, job: str, monkeypatch: pytest.MonkeyPatch):
+    asked: list[str] = []
+    monkeypatch.setattr(viser.ViserServer, "request_share_url", lambda self: asked.append("tunnel"))
+    with session(live) as mine:
+        path = mine.show(job, "cekf")["cekf"]
+        server = live.app.state.site.scenes.panes[path.split("/")[2]].server
+        with viewer(live, path) as socket:
+            socket.recv(timeout=PATIENCE_S)
+            socket.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
+            socket.send(camera(position=(1.0, 2.0, 3.0)))
+            until(lambda: server.get_clients(), "the viewer")
+            (client,) = server.get_clients().values()
+            until(lambda: tuple(client.camera.position) == (1.0, 2.0, 3.0), "the camera, sent after the request")
+    assert asked == []
+
+
+def camera(position: tuple[float, float, float]) -> bytes:
+    message = {
+        "type": "ViewerCameraMessage",
+        "wxyz": (1.0, 0.0, 0.0, 0.0),
+        "position": position,
+        "fov": 1.0,
+        "near": 0.01,
+        "far": 1000.0,
+        "image_height": 100,
+        "image_width": 100,
+        "look_at": (0.0, 0.0, 0.0),
+        "up_direction": (0.0, 0.0, 1.0),
+    }
+    return msgspec.msgpack.encode(message)
+
+
+def test_the_other_panes_follow_the_camera_of_one(live: Live, job: str):
+    with session(live) as mine:
+        panes = mine.show(job, "cekf", "nekf")
+        servers = [live.app.state.site.scenes.panes[p.split("/")[2]].server for p in panes.values()]
+        with viewer(live, panes["cekf"]) as one, viewer(live, panes["nekf"]) as other:
+            for socket, server in ((one, servers[0]), (other, servers[1])):
+                socket.send(camera(position=(0.0, -9.0, 9.0)))
+                until(lambda server=server: server.get_clients(), "the viewer")
+            one.send(camera(position=(4.0, 5.0, 6.0)))
+            (follower,) = servers[1].get_clients().values()
+            until(lambda: tuple(follower.camera.position) == (4.0, 5.0, 6.0), "the other pane's camera")
+
+
+def test_panes_close_with_their_session(live: Live, job: str):
+    with session(live) as mine:
+        path = mine.show(job, "cekf")["cekf"]
+        assert live.http.get(path).status_code == 200
+    until(lambda: live.http.get(path).status_code == 404, "the pane's end")
+    with pytest.raises((InvalidStatus, ConnectionClosed)), viewer(live, path):
+        pass
+    assert live.http.get("/scenes/guess/").status_code == 404
+
+
+def test_two_sessions_share_nothing(live: Live, job: str):
+    with session(live) as mine, session(live) as yours:
+        assert mine.show(job, "cekf")["cekf"] != yours.show(job, "cekf")["cekf"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{",
+        "[]",
+        "3",
+        '{"type": "dance"}',
+        '{"type": "show"}',
+        '{"type": "show", "job": "nosuchjob", "panes": []}',
+        '{"type": "seek", "time_s": NaN}',
+        '{"type": "seek", "time_s": "x"}',
+        '{"type": "options", "trails": 3}',
+        '{"type": "options", "glitter": true}',
+        "[" * 5000,
+    ],
+)
+def test_a_message_not_understood_is_answered_and_the_session_lives(live: Live, job: str, text: str):
+    with session(live) as mine:
+        mine.socket.send(text)
+        answer = json.loads(mine.socket.recv(timeout=PATIENCE_S))
+        assert answer["type"] == "error" and answer["detail"]
+        assert mine.show(job, "cekf")
+
+
+def test_panes_are_limited(live: Live, job: str):
+    with session(live) as mine:
+        mine.say(type="show", job=job, panes=[f"a{n}" for n in range(7)])
+        assert "at most 6" in json.loads(mine.socket.recv(timeout=PATIENCE_S))["detail"]
+        mine.say(type="show", job=job, panes=["teleportation"])
+        assert "teleportation" in json.loads(mine.socket.recv(timeout=PATIENCE_S))["detail"]
+
+
+def test_a_page_of_another_site_opens_no_session(live: Live):
+    with pytest.raises(InvalidStatus), connect(f"{live.ws}/api/scenes/session", origin="http://evil.example"):
+        pass
