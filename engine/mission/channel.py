@@ -1,4 +1,4 @@
-"""The acoustic channel of a simulated mission: who broadcasts when, who could hear it, when it arrives, what is lost."""
+"""The acoustic channel of a simulated mission: who broadcasts when, who may hear it, when it arrives, what is lost."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.mission.log import AcousticLog
 from engine.mission.streams import normals, uniforms
-from engine.mission.vehicle import Voyage
+from engine.mission.vehicle import Voyage, within
 from engine.scenario.navigation import NavigationScenario
 from engine.scenario.network import BurstyLoss, FixedLoss, LossModel, Network, RangeLoss, RecordedLoss, SnrLoss
 
@@ -49,7 +49,7 @@ def sound(scenario: NavigationScenario, voyages: Sequence[Voyage], trials: Seque
         name = voyage.vehicle.name
         noise = normals(scenario.seed, trials, name, "ranging", (len(tol), 2))[:, b]
         chance = uniforms(scenario.seed, trials, name, "ranging chances", (len(tol), 3))[:, b]
-        error = modem.range_sigma_m * noise[..., 0].astype(float)
+        error = modem.range_sigma_m * noise[..., 0]
         gross = chance[..., 1] < modem.outlier_rate
         error += np.where(gross, modem.outlier_sigma_m * np.abs(noise[..., 1]), 0.0)
         distance = delay * network.sound_speed_mps
@@ -60,10 +60,8 @@ def sound(scenario: NavigationScenario, voyages: Sequence[Voyage], trials: Seque
                 turn = np.cumsum(sender == s)[b[mine]] - 1
                 pair = (voyages[s].vehicle.name, name)
                 got[:, mine] = heard(network.loss_model, pair, turn, tol[b[mine]], distance[mine], chance[:, mine])
-        silent = np.zeros(toa.shape, dtype=bool)
-        for stretch in network.silences:
-            silent |= (toa >= stretch.start_s) & (toa <= stretch.end_s)
-        measured = np.where(got & ~silent, travel + error / network.sound_speed_mps, np.nan)
+        got[:, within(network.silences, toa)] = False
+        measured = np.where(got, travel + error / network.sound_speed_mps, np.nan)
         columns.append((b, np.full(len(b), r), toa, measured))
 
     if not columns:
@@ -108,7 +106,7 @@ def links(scenario: NavigationScenario) -> np.ndarray:
 
 def sound_speeds(network: Network, seed: int, trials: Sequence[int]) -> np.ndarray:
     """The true sound speed of every trial (trials,), m/s; never below a tenth of the assumed one."""
-    drawn = normals(seed, trials, "", "sound speed", (1,))[:, 0].astype(float)
+    drawn = normals(seed, trials, "", "sound speed", (1,))[:, 0]
     speed = network.sound_speed_mps + network.sound_speed_sigma_mps * drawn
     return np.maximum(speed, 0.1 * network.sound_speed_mps)
 

@@ -51,7 +51,7 @@ def _scenario(log: Log, scenario: NavigationScenario, mission: dict, vehicles: l
     """The scenario that reads the files back; losses and silences are in the log already, claims are not kept."""
     plain = toml.plain(scenario)
     kept = {k: plain[k] for k in ("schema", "title", "source", "family", "seed", "algorithms", "options") if k in plain}
-    network = {k: v for k, v in plain.get("network", {}).items() if k not in ("links", "loss", "tdma")}
+    network = {k: v for k, v in plain.get("network", {}).items() if k not in ("links", "loss", "silences", "tdma")}
     data = kept | {
         "summary": f"The first trial of {scenario.title!r}, written as CSV."[:4000],
         "duration_s": log.duration_s,
@@ -140,7 +140,7 @@ def _truth(folder: Path, name: str, time_s: np.ndarray, position: np.ndarray) ->
 
 
 def _ranges(folder: Path, log: Log) -> dict:
-    """Every possible reception, its travel time empty where nothing was heard; one without receiver where none was possible."""
+    """Every possible reception, without travel time where nothing was heard; an unheard broadcast has no receiver."""
     a = log.acoustics
     names = [v.name for v in log.vehicles]
     rows = []

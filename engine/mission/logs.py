@@ -35,7 +35,7 @@ def files(mission: CsvRecording | PyfgRecording) -> Iterator[tuple[str, str]]:
 
 
 def log_folder(scenario, extra: Sequence[Path | str] = ()) -> Path:
-    """The folder with all of a recorded mission's files. Raises ScenarioError that says what was looked for, and where."""
+    """The folder with all of a recorded mission's files. Raises ScenarioError that says what was sought, and where."""
     mission = scenario.mission
     searched = roots(scenario.origin, extra)
     if mission.log == ".":

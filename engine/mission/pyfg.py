@@ -13,6 +13,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -80,7 +81,7 @@ def read_pyfg(scenario: NavigationScenario, folder: Path) -> Recording:
     return Recording(sensed, receptions, nodes, reference, first_instant(sensed, receptions, reference), tuple(notes))
 
 
-def _fail(key: str, message: str, remedy: str):
+def _fail(key: str, message: str, remedy: str) -> NoReturn:
     raise ScenarioError([Problem(key, message, remedy)])
 
 
@@ -232,7 +233,7 @@ def _beacon_fixes(graph: Graph, launches: list[tuple[float, str]], mission: Pyfg
 
 
 def _landmark_fixes(graph: Graph, poses: set[str]) -> Fixes | None:
-    """Position fixes from two or more known landmarks seen at once, which need no heading; None where there are none."""
+    """Position fixes from two or more known landmarks seen at once, which need no heading; None without any."""
     seen: dict[str, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = defaultdict(list)
     for pose, landmark, offset, cov in graph.sightings:
         if pose in poses and landmark in graph.points:

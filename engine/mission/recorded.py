@@ -79,7 +79,7 @@ from engine.mission.recording import (
 from engine.mission.tables import PER_SECOND, Sheet, sheet, stacked
 from engine.scenario.navigation import NavigationScenario
 from engine.scenario.recording import CsvRecording, OdometryFile, RangesFile, VelocityFile
-from engine.scenario.vehicles import OdometrySensor, Vehicle
+from engine.scenario.vehicles import Vehicle
 
 
 def read(scenario: NavigationScenario, trials: Sequence[int], logs: Sequence[Path | str] = ()) -> Log:
@@ -181,7 +181,9 @@ def _odometry(rows: Sheet, source: OdometryFile, vehicle: Vehicle) -> Odometry:
     else:
         first = time_s[1] - time_s[0] if len(time_s) > 1 else 1.0
         dt = np.diff(time_s, prepend=time_s[0] - first)
-        cov = odometry_cov(vehicle.sensors.odometry or OdometrySensor(), forward, left, dt)
+        noise = vehicle.sensors.odometry
+        assert noise is not None
+        cov = odometry_cov(noise, forward, left, dt)
     return Odometry(time_s, np.stack([forward, left, turn], axis=-1)[None], cov)
 
 

@@ -27,12 +27,12 @@ from engine.mission.log import (
 )
 from engine.mission.reports import report_times
 from engine.mission.streams import uniforms
+from engine.mission.vehicle import within
 from engine.scenario.errors import Problem, ScenarioError
 from engine.scenario.models import MAX_DURATION_S
 from engine.scenario.navigation import MAX_REPORTS, NavigationScenario
-from engine.scenario.network import FixedLoss
 from engine.scenario.paths import Station
-from engine.scenario.vehicles import OdometryNoise, OdometrySensor, Vehicle
+from engine.scenario.vehicles import OdometrySensor, Vehicle
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,8 @@ def odometry_cov(noise: OdometrySensor, forward: np.ndarray, left: np.ndarray, d
     metres = np.hypot(forward, left)
     cov = np.zeros((len(forward), 3, 3))
     for part, amount in ((noise.per_reading, np.ones_like(dt)), (noise.per_sqrt_m, metres), (noise.per_sqrt_s, dt)):
-        part = part or OdometryNoise()
+        if part is None:
+            continue
         sigma = np.array([part.forward_sigma_m, part.left_sigma_m, np.radians(part.turn_sigma_deg)])
         cov += np.diag(sigma**2) * amount[:, None, None]
     return cov
@@ -267,7 +268,7 @@ def _early_heading(course: Course | None) -> float | None:
 def _acoustics(
     scenario: NavigationScenario, receptions: Sequence[Reception], start: float, duration: float, trials: Sequence[int]
 ) -> AcousticLog:
-    """The channel's history on the mission's clock; receptions outside the mission or the scenario's links are left out."""
+    """The channel's history on the mission's clock, without what lies outside the mission or the scenario's links."""
     index = {name: i for i, name in enumerate(scenario.names)}
     allowed = None if scenario.network.links == "all" else {tuple(pair) for pair in scenario.network.links}
     inside = [r for r in receptions if r.tol_s >= start and r.toa_s - start <= duration]
@@ -280,15 +281,17 @@ def _acoustics(
     broadcast = np.array([number[r.broadcast] for r in mine], dtype=int)
     receiver = np.array([index[r.receiver] for r in mine if r.receiver is not None], dtype=int)
     travel = np.tile([r.travel_time_s for r in mine], (len(trials), 1))
-    travel[~_through(scenario, sender, tol, broadcast, receiver, travel, trials)] = np.nan
-    return AcousticLog(sender, tol, broadcast, receiver, np.array([r.toa_s - start for r in mine]), travel)
+    toa = np.array([r.toa_s - start for r in mine])
+    travel[~_through(scenario, sender, tol, broadcast, receiver, toa, travel, trials)] = np.nan
+    return AcousticLog(sender, tol, broadcast, receiver, toa, travel)
 
 
-def _through(scenario, sender, tol, broadcast, receiver, travel, trials) -> np.ndarray:
+def _through(scenario, sender, tol, broadcast, receiver, toa, travel, trials) -> np.ndarray:
     """Which recorded receptions (trials, R) survive the loss that the scenario adds."""
     loss = scenario.network.loss_model
     got = np.ones(travel.shape, dtype=bool)
-    if isinstance(loss, FixedLoss) and loss.rate == 0:
+    got[:, within(scenario.network.silences, toa)] = False
+    if scenario.network.loss == 0:
         return got
     distance = np.nan_to_num(travel[0] * scenario.network.sound_speed_mps)
     for r, name in enumerate(scenario.names):

@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.mission.log import Depth, Fixes, Heading, InitialBelief, VehicleLog, Velocity
 from engine.mission.routes import Route, route
-from engine.mission.streams import normals
+from engine.mission.streams import measured, normals
 from engine.scenario.vehicles import Interval, Vehicle
 
 #: How fast an AUV comes up to the surface and goes down again, m/s.
@@ -65,38 +65,30 @@ def sense(voyage: Voyage, duration_s: float, trials: Sequence[int]) -> VehicleLo
     """What the vehicle's own sensors read in each trial."""
     vehicle, sensors = voyage.vehicle, voyage.vehicle.sensors
 
-    def noise(purpose: str, sigma: float, *shape: int) -> np.ndarray:
-        drawn = normals(voyage.seed, trials, vehicle.name, purpose, shape)
-        return np.multiply(drawn, sigma, dtype=np.float64)
+    def read(purpose: str, truth: np.ndarray, sigma: np.ndarray | float) -> np.ndarray:
+        return measured(truth, sigma, voyage.seed, trials, vehicle.name, purpose)
 
     velocity = heading = depth = fixes = None
-    if sensors.dvl is not None:
-        t = ticks(sensors.dvl.rate_hz, duration_s)
-        value = noise("dvl", 1.0, len(t), 2)
-        value *= [sensors.dvl.along_sigma_mps, sensors.dvl.cross_sigma_mps]
-        value += body_velocity(voyage.route, t)
-        velocity = Velocity(t, value, sensors.dvl.along_sigma_mps, sensors.dvl.cross_sigma_mps)
+    if (dvl := sensors.dvl) is not None:
+        t = ticks(dvl.rate_hz, duration_s)
+        value = read("dvl", body_velocity(voyage.route, t), np.array([dvl.along_sigma_mps, dvl.cross_sigma_mps]))
+        velocity = Velocity(t, value, dvl.along_sigma_mps, dvl.cross_sigma_mps)
     if sensors.heading is not None:
         t = ticks(sensors.heading.rate_hz, duration_s)
-        sigma = np.radians(sensors.heading.sigma_deg)
-        value = noise("heading", sigma, len(t))
-        value += voyage.route(t).heading
-        heading = Heading(t, value, float(sigma))
+        sigma = float(np.radians(sensors.heading.sigma_deg))
+        heading = Heading(t, read("heading", voyage.route(t).heading, sigma), sigma)
     if sensors.depth is not None:
         t = ticks(sensors.depth.rate_hz, duration_s)
-        value = noise("depth", sensors.depth.sigma_m, len(t))
-        value += voyage.depth(t)
-        depth = Depth(t, value, sensors.depth.sigma_m)
+        depth = Depth(t, read("depth", voyage.depth(t), sensors.depth.sigma_m), sensors.depth.sigma_m)
     if sensors.gps is not None:
         t = ticks(sensors.gps.rate_hz, duration_s)
         received = voyage.surfaced(t) if vehicle.kind == "auv" else np.ones(t.shape, dtype=bool)
         received &= ~within(sensors.gps.outages, t)
-        # Drawn for every second of the mission, so that a longer surfacing changes no other fix.
-        value = noise("gps", sensors.gps.sigma_m, len(t), 2)[:, received]
-        t = t[received]
-        if t.size:
-            value += voyage.route(t).position
-            fixes = Fixes(t, value, np.tile(np.eye(2) * sensors.gps.sigma_m**2, (len(t), 1, 1)))
+        if received.any():
+            # Drawn for the whole mission, so that a longer surfacing changes no other fix.
+            value = read("gps", voyage.route(t).position, sensors.gps.sigma_m)[:, received]
+            cov = np.tile(np.eye(2) * sensors.gps.sigma_m**2, (int(received.sum()), 1, 1))
+            fixes = Fixes(t[received], value, cov)
 
     return VehicleLog(
         name=vehicle.name,
@@ -124,7 +116,7 @@ def believe(voyage: Voyage, trials: Sequence[int]) -> InitialBelief:
     """What the vehicle believes at the start: the truth and an error of the stated sigmas, drawn for each trial."""
     initial = voyage.vehicle.initial
     start = voyage.route(np.zeros(1))
-    error = normals(voyage.seed, trials, voyage.vehicle.name, "initial", (5,)).astype(float)
+    error = normals(voyage.seed, trials, voyage.vehicle.name, "initial", (5,))
     heading_sigma = np.radians(initial.heading_sigma_deg)
     return InitialBelief(
         position_m=start.position[0] + initial.position_sigma_m * error[:, :2],

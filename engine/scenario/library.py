@@ -50,9 +50,9 @@ def find(name_or_path: str) -> ScenarioBase:
 
 
 def missing(scenario: ScenarioBase, *roots: Path | str) -> str | None:
-    """Why a scenario's recording cannot be read on this machine, without reading it; None where it can, or is simulated.
+    """Why a scenario's recording is not to be found on this machine; None where it is, or the mission is simulated.
 
-    roots are folders to look in besides those always searched.
+    The recording is not read. roots are folders to look in besides those always searched.
     """
     mission = getattr(scenario, "mission", None)
     if getattr(mission, "kind", None) != "recorded":

@@ -35,7 +35,7 @@ Mission = Annotated[
     Discriminator(
         _which,
         custom_error_type="mission",
-        custom_error_message='is no known mission; use kind = "simulated", or kind = "recorded" with format = "csv" or "pyfg"',
+        custom_error_message="is no known mission",
     ),
 ]
 
@@ -50,7 +50,7 @@ class NavigationScenario(ScenarioBase):
     vehicles: list[Vehicle] = Field(
         min_length=1, max_length=MAX_VEHICLES, description="everyone with a modem or a name"
     )
-    network: Network = Field(Network(), description="who hears whom")
+    network: Network = Field(Network.model_validate({}), description="who hears whom")
     mission: Mission = Field(Simulated(kind="simulated"), description="simulated, or where the recording is")
 
     @property

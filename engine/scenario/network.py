@@ -138,4 +138,4 @@ class Network(Table):
     @property
     def loss_model(self) -> LossModel:
         """The loss as a model, also where the file has a plain number."""
-        return FixedLoss(kind="fixed", rate=self.loss, links=[]) if isinstance(self.loss, float) else self.loss
+        return FixedLoss(kind="fixed", rate=self.loss, links=[]) if isinstance(self.loss, float | int) else self.loss

@@ -13,14 +13,15 @@ from engine.scenario.models import Positive, Table, faults
 FolderName = Annotated[str, StringConstraints(pattern=r"^(\.|[A-Za-z0-9][A-Za-z0-9_.-]{0,99})$")]
 FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}\.(csv|tsv|txt|pyfg|fg)$")]
 Column = Annotated[str, StringConstraints(min_length=1, max_length=200)]
-TimeUnit = Literal["s", "ms", "us", "ns"]
+Unit = Literal["s", "ms", "us", "ns"]
 AngleUnit = Literal["rad", "deg"]
-Convention = Literal["math", "compass"]
-
-_FILE = Field(description="name of the CSV file in the log's folder")
-_TIME = Field(description="column of the time")
-_TIME_UNIT = Field("s", description="unit of the time column")
-_CONVENTION = Field("math", description="math: counter-clockwise from x (east); compass: clockwise from y (north)")
+File = Annotated[FileName, Field(description="name of the CSV file in the log's folder")]
+Time = Annotated[Column, Field(description="column of the time")]
+TimeUnit = Annotated[Unit, Field(description="unit of the time column")]
+Convention = Annotated[
+    Literal["math", "compass"],
+    Field(description="math: counter-clockwise from x (east); compass: clockwise from y (north)"),
+]
 
 
 class Simulated(Table):
@@ -33,9 +34,9 @@ class OdometryFile(Table):
     """Pose increments since the previous row: forward, to the left where there is such a column, and turn."""
 
     vehicle: str = Field(description="vehicle it is of")
-    file: FileName = _FILE
-    time: Column = _TIME
-    time_unit: TimeUnit = _TIME_UNIT
+    file: File
+    time: Time
+    time_unit: TimeUnit = "s"
     forward: Column = Field(description="column of the metres forward")
     left: Column | None = Field(None, description="column of the metres to the left")
     turn: Column = Field(description="column of the turn")
@@ -52,9 +53,9 @@ class VelocityFile(Table):
     """Velocities over ground: in the body frame (forward, left or right), or in the world frame (east, north)."""
 
     vehicle: str = Field(description="vehicle it is of")
-    file: FileName = _FILE
-    time: Column = _TIME
-    time_unit: TimeUnit = _TIME_UNIT
+    file: File
+    time: Time
+    time_unit: TimeUnit = "s"
     forward: Column | None = Field(None, description="column of the body velocity forward, m/s")
     left: Column | None = Field(None, description="column of the body velocity to the left, m/s")
     right: Column | None = Field(None, description="column of the body velocity to the right, m/s, instead of left")
@@ -82,21 +83,21 @@ class HeadingFile(Table):
     """Absolute headings."""
 
     vehicle: str = Field(description="vehicle it is of")
-    file: FileName = _FILE
-    time: Column = _TIME
-    time_unit: TimeUnit = _TIME_UNIT
+    file: File
+    time: Time
+    time_unit: TimeUnit = "s"
     heading: Column = Field(description="column of the heading")
     unit: AngleUnit = Field("rad", description="unit of the heading")
-    convention: Convention = _CONVENTION
+    convention: Convention = "math"
 
 
 class DepthFile(Table):
     """Depths."""
 
     vehicle: str = Field(description="vehicle it is of")
-    file: FileName = _FILE
-    time: Column = _TIME
-    time_unit: TimeUnit = _TIME_UNIT
+    file: File
+    time: Time
+    time_unit: TimeUnit = "s"
     depth: Column = Field(description="column of the depth, m")
     positive: Literal["down", "up"] = Field("down", description="direction of positive numbers")
 
@@ -105,9 +106,9 @@ class FixesFile(Table):
     """Absolute positions (GPS)."""
 
     vehicle: str = Field(description="vehicle it is of")
-    file: FileName = _FILE
-    time: Column = _TIME
-    time_unit: TimeUnit = _TIME_UNIT
+    file: File
+    time: Time
+    time_unit: TimeUnit = "s"
     x: Column = Field(description="column of the position east, m")
     y: Column = Field(description="column of the position north, m")
     cov: Annotated[list[Column], Field(min_length=3, max_length=3)] | None = Field(
@@ -123,16 +124,16 @@ class RangesFile(Table):
     that column each row is a broadcast of its own, launched a travel time before it arrived.
     """
 
-    file: FileName = _FILE
-    time: Column = _TIME
-    time_unit: TimeUnit = _TIME_UNIT
+    file: File
+    time: Time
+    time_unit: TimeUnit = "s"
     sender: str | None = Field(None, description="vehicle that sends")
     sender_column: Column | None = Field(None, description="column of who sends, instead")
     receiver: str | None = Field(None, description="vehicle that measures the range")
     receiver_column: Column | None = Field(None, description="column of who measures, instead")
     range: Column | None = Field(None, description="column of the range, m")
     travel_time: Column | None = Field(None, description="column of the one-way travel time, instead")
-    travel_time_unit: TimeUnit = Field("s", description="unit of the travel time")
+    travel_time_unit: Unit = Field("s", description="unit of the travel time")
     tol: Column | None = Field(None, description="column of the time of launch, in the unit of the time column")
     broadcast: Column | None = Field(None, description="column of the number of the broadcast")
     names: dict[str, str] = Field({}, description="what stands in the columns -> name of the vehicle")
@@ -161,7 +162,7 @@ class RangesFile(Table):
 class NodesFile(Table):
     """Positions of fixed nodes, one a row."""
 
-    file: FileName = _FILE
+    file: File
     name: Column = Field(description="column that names the node")
     x: Column = Field(description="column of the position east, m")
     y: Column = Field(description="column of the position north, m")
@@ -172,14 +173,14 @@ class TruthFile(Table):
     """Positions to score against, interpolated between rows."""
 
     vehicle: str = Field(description="vehicle it is of")
-    file: FileName = _FILE
-    time: Column = _TIME
-    time_unit: TimeUnit = _TIME_UNIT
+    file: File
+    time: Time
+    time_unit: TimeUnit = "s"
     x: Column = Field(description="column of the position east, m")
     y: Column = Field(description="column of the position north, m")
     heading: Column | None = Field(None, description="column of the heading, for the start")
     heading_unit: AngleUnit = Field("rad", description="unit of the heading")
-    convention: Convention = _CONVENTION
+    convention: Convention = "math"
     max_gap_s: Positive = Field(10.0, description="longest gap to interpolate over, s")
 
 

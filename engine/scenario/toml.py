@@ -59,9 +59,9 @@ def validate(data: Any, *, origin: str = "") -> ScenarioBase:
     if data.get("schema") != 1 or isinstance(data.get("schema"), bool):
         found = f"is {data['schema']!r}" if "schema" in data else "is missing"
         problems.append(Problem("schema", found, "write schema = 1"))
-    family = data.get("family")
-    if not isinstance(family, str) or family not in MODELS:
-        found = f"is {family!r}" if "family" in data else "is missing"
+    family = str(data.get("family"))
+    if family not in MODELS:
+        found = f"is {_shown(data['family'])}" if "family" in data else "is missing"
         problems.append(Problem("family", found, f"use one of: {', '.join(MODELS)}"))
     if problems:
         raise ScenarioError(problems)
@@ -139,7 +139,7 @@ def _problems(error: ValidationError, data: Any) -> list[Problem]:
     for e in error.errors(include_url=False):
         key = _key(e["loc"], data)
         if e["type"] == "problems":
-            found += [Problem(_join(key, p.key), p.message, p.remedy) for p in e["ctx"]["problems"]]
+            found += [Problem(_join(key, p.key), p.message, p.remedy) for p in e.get("ctx", {})["problems"]]
         else:
             found.append(Problem(key, *_words(e)))
     return found
