@@ -44,6 +44,9 @@ def parser() -> argparse.ArgumentParser:
     check = kinds.add_parser("check", help="check what the sources of scenarios claim")
     check.add_argument("scenarios", nargs="*", metavar="SCENARIO", help="shipped name, file or folder")
     check.add_argument("--all", action="store_true", help="all shipped scenarios")
+    check.add_argument(
+        "--table-1", action="store_true", help="measure W11's Table I: five topologies and one with loss"
+    )
     check.add_argument("--workers", type=_count, metavar="N", help="processes to use (default: one per core)")
     check.set_defaults(run=commands.check)
 

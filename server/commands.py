@@ -12,6 +12,7 @@ from typing import Any
 from tqdm import tqdm
 
 from engine import registry, runner, sweep
+from engine.evaluation import comparison
 from engine.evaluation.result import Result
 from engine.scenario import library, toml
 from engine.scenario.models import ScenarioBase
@@ -64,8 +65,10 @@ def run(chosen: Namespace) -> int:
 
 def check(chosen: Namespace) -> int:
     """Run scenarios for their claims; 1 where one fails."""
+    if chosen.table_1:
+        return _table_1(chosen.workers)
     if chosen.all == bool(chosen.scenarios):
-        raise Usage("name the scenarios to check, or give --all")
+        raise Usage("name the scenarios to check, or give --all or --table-1")
     names: Sequence[str] = library.names() if chosen.all else chosen.scenarios
     scenarios = {name: _find(name) for name in names}
     failed = 0
@@ -83,6 +86,39 @@ def check(chosen: Namespace) -> int:
             failed += claim["holds"] is False
     print(f"{failed} claim{'s' * (failed != 1)} failed" if failed else "no claim failed")
     return 1 if failed else 0
+
+
+def _table_1(workers: int | None) -> int:
+    """Measure W11's Table I with 100 trials a run and print it; 1 where a cell differs from the paper's."""
+
+    def run(name: str, loss: float) -> dict[str, Any]:
+        scenario = toml.override(library.find(name), {"trials": 100, "network.loss": loss})
+        print(f"{name}, loss {loss:g}", file=sys.stderr)
+        return _run(scenario, comparison.ALGORITHMS, workers).to_json()
+
+    lossless = {name: run(name, 0.0) for name in comparison.TOPOLOGIES}
+    rows = comparison.table_1(lossless, run(comparison.LOSSY, comparison.LOSS))
+    ticks = {True: "yes", False: "no", None: "-"}
+    header = ["algorithm", *(c.replace("_", " ") for c in comparison.COLUMNS), "floats", "bytes"]
+    figures = [
+        [
+            row["algorithm"],
+            *(ticks[row[c]["holds"]] for c in comparison.COLUMNS),
+            table.number(row["floats_per_packet"]),
+            table.number(row["bytes_per_packet"]),
+        ]
+        for row in rows
+    ]
+    print("\n".join(table.lines(header, figures, left=1)))
+    differing = 0
+    for row in rows:
+        for column in comparison.COLUMNS:
+            cell = row[column]
+            differs = cell["paper"] is not None and cell["paper"] != cell["holds"]
+            differing += differs
+            against = f" (the paper says {ticks[cell['paper']]})" if differs else ""
+            print(f"{row['algorithm']}, {column.replace('_', ' ')}: {ticks[cell['holds']]}{against}: {cell['why']}")
+    return 1 if differing else 0
 
 
 def log(chosen: Namespace) -> int:

@@ -58,7 +58,8 @@ def evaluate(
 
     rmse_m is over trials and times, final_rmse_m over trials at the last time with a reference; sigma_m is
     the mean over trials and times of the fourth root of the xy covariance's determinant, final_sigma_m its
-    mean at the last time; anees the mean over times of the NEES averaged over trials; max_deviation_m the
+    mean at the last time; sigma_growth its mean over the last quarter of the mission relative to the second, above
+    one where uncertainty keeps growing; anees the mean over times of the NEES averaged over trials; max_deviation_m the
     largest distance over trials and times between the mean and the benchmark's. Undefined or infinite figures
     are None.
     """
@@ -72,6 +73,13 @@ def evaluate(
     }
 
 
+def _growth(spread: np.ndarray) -> float | None:
+    """Mean of a curve (T,) over its last quarter relative to its second; None for a curve too short or zero."""
+    quarter = len(spread) // 4
+    early = spread[quarter : 2 * quarter].mean() if quarter else 0.0
+    return number(spread[-quarter:].mean() / early) if early > 0 else None
+
+
 def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: Belief | None) -> SubjectMetrics:
     belief = tracks.beliefs[subject]
     if truth is None:
@@ -80,6 +88,7 @@ def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: 
     metrics = _error(truth, belief) | {
         "sigma_m": number(spread.mean()),
         "final_sigma_m": number(spread[:, -1].mean()),
+        "sigma_growth": _growth(spread.mean(axis=0)),
     }
     ranges = gate(tracks.innovations[subject]) if subject in tracks.innovations else None
 
