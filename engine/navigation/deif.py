@@ -30,7 +30,7 @@ from engine.navigation.chains import XY, Step
 from engine.navigation.mission import Arrival, Launch, NavigationMission
 from engine.navigation.network import Member, Packet, run_nodes, slant_to_horizontal
 from engine.navigation.ranging import Innovation
-from engine.navigation.served import ServedFilter
+from engine.navigation.served import ServedFilter, only_in
 from engine.registry import Algorithm, Progress
 from engine.tracks import Tracks
 
@@ -78,25 +78,14 @@ def unpack_link(record: np.ndarray) -> tuple[Link, np.ndarray]:
         full[name] = matrix
     A, b, eta = (record[name].astype(float) for name in ("A", "b", "eta"))
     flat = [A.reshape(len(record), -1), b, eta, *(m.reshape(len(record), -1) for m in full.values())]
-    finite = np.isfinite(np.concatenate(flat, axis=-1)).all(-1)
-    for name, matrix in full.items():
-        matrix = np.where(finite[:, None, None], matrix, 0.0)
+    proper: np.ndarray = np.isfinite(np.concatenate(flat, axis=-1)).all(axis=-1)
+    for name in ("C", "J"):
+        matrix = np.where(proper[:, None, None], full[name], 0.0)
         values, vectors = np.linalg.eigh(matrix)
-        finite &= values[:, 0] >= -1e-3 * np.maximum(np.abs(values[:, -1]), 1e-9)
+        proper = proper & (values[:, 0] >= -1e-3 * np.maximum(np.abs(values[:, -1]), 1e-9))
         clipped = (vectors * np.maximum(values, 0.0)[:, None, :]) @ transpose(vectors)
         full[name] = np.where((values[:, 0] < 0)[:, None, None], clipped, matrix)
-    ok = finite
-    zero = np.zeros_like(full["C"])
-    return (
-        Link(
-            np.where(ok[:, None, None], A, np.eye(n)),
-            np.where(ok[:, None], b, 0.0),
-            np.where(ok[:, None, None], full["C"], zero),
-            np.where(ok[:, None], eta, 0.0),
-            np.where(ok[:, None, None], full["J"], zero),
-        ),
-        ok,
-    )
+    return only_in(proper, Link(A, b, full["C"], eta, full["J"])), proper
 
 
 class FullServer:

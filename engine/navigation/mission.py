@@ -140,7 +140,7 @@ def outline(mission: NavigationMission) -> Outline:
         if v.fixes is not None and v.kind != "fixed":
             _, first = np.unique(np.floor(v.fixes.time_s), return_index=True)
             events += [{"kind": "fix", "subject": v.name, "time_s": float(t)} for t in v.fixes.time_s[first]]
-    events.sort(key=lambda e: e.get("toa_s", e.get("time_s")))
+    events.sort(key=lambda e: e["toa_s"] if e["kind"] == "packet" else e["time_s"])
     subjects = [
         {"name": v.name, "kind": v.kind, "depth_m": float(depth_at(v, np.zeros(1))[0, 0])} for v in log.vehicles
     ]

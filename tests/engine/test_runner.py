@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 
 import numpy as np
@@ -61,4 +62,4 @@ def test_progress_ends_at_one_and_never_goes_back():
     told: list[float] = []
     runner.run(short(1), ["dead_reckoning", "nekf"], workers=1, progress=told.append)
     assert told[-1] == 1.0
-    assert all(b >= a for a, b in zip(told, told[1:]))
+    assert all(b >= a for a, b in itertools.pairwise(told))
