@@ -78,7 +78,7 @@ def unpack_link(record: np.ndarray) -> tuple[Link, np.ndarray]:
         full[name] = matrix
     A, b, eta = (record[name].astype(float) for name in ("A", "b", "eta"))
     flat = [A.reshape(len(record), -1), b, eta, *(m.reshape(len(record), -1) for m in full.values())]
-    proper: np.ndarray = np.isfinite(np.concatenate(flat, axis=-1)).all(axis=-1)
+    proper = np.logical_and.reduce(np.isfinite(np.concatenate(flat, axis=-1)), axis=-1)
     for name in ("C", "J"):
         matrix = np.where(proper[:, None, None], full[name], 0.0)
         values, vectors = np.linalg.eigh(matrix)

@@ -418,7 +418,8 @@ def _pair_of(record: np.ndarray, n: int) -> tuple[Moments, np.ndarray]:
     upper = np.triu_indices(2 * n)
     cov = np.zeros((len(record), 2 * n, 2 * n))
     cov[:, upper[0], upper[1]] = cov[:, upper[1], upper[0]] = record["cov"]
-    finite: np.ndarray = np.isfinite(cov).all(axis=(-1, -2)) & np.isfinite(record["mean"]).all(axis=-1)
+    flat = np.concatenate([cov.reshape(len(record), -1), record["mean"]], axis=-1)
+    finite = np.logical_and.reduce(np.isfinite(flat), axis=-1)
     cov = np.where(finite[:, None, None], cov, np.eye(2 * n))
     values = np.linalg.eigvalsh(cov)
     proper = finite & (values[:, 0] >= -1e-9 * values[:, -1]) & (values[:, -1] > 0)
