@@ -48,6 +48,7 @@ def create_app(settings: Settings) -> FastAPI:
             journal.close()
             await scenes.close()
             await work.close()
+            starting.cancel()
             await asyncio.gather(starting, return_exceptions=True)
             await journal.flush()
             await cluster.close()

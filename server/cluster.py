@@ -19,6 +19,8 @@ from server.settings import Settings
 log = logging.getLogger(__name__)
 
 
+#: Pause between attempts to reach somebody's cluster.
+AGAIN_S = 2.0
 #: Dask makes glibc give memory back at once, which costs arrays of many megabytes a third of their speed.
 MEMORY = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
@@ -53,18 +55,20 @@ class Cluster:
         self.failure: str | None = None
 
     async def start(self, hear: Callable[[dict[str, Any]], None]) -> None:
-        """Start or join the cluster; `hear` gets what running shards tell."""
-        try:
-            address: Any = self._settings.cluster
-            if address is None:
-                address = self._own = await _own_cluster(self._settings.workers)
-            self._client = await Client(address, asynchronous=True, name="coopnav")  # pyright: ignore
-            await self._client.register_plugin(work.Prepared())  # pyright: ignore
-            self._client.subscribe_topic(self._topic, lambda event: hear(event[1]))
-        except Exception as error:
-            self.failure = f"no Dask cluster at {self._settings.cluster}" if self._settings.cluster else str(error)
-            log.exception("the Dask cluster could not be reached")
-            raise
+        """Start or join the cluster, trying again until it is there; `hear` gets what running shards tell."""
+        address: Any = self._settings.cluster
+        if address is None:
+            address = self._own = await _own_cluster(self._settings.workers)
+        while self._client is None:
+            try:
+                self._client = await Client(address, asynchronous=True, name="coopnav", timeout=5)  # pyright: ignore
+            except (OSError, ValueError) as error:
+                self.failure = f"the Dask cluster at {address} does not answer: {error}"
+                log.warning("%s", self.failure)
+                await asyncio.sleep(AGAIN_S)
+        self._client.subscribe_topic(self._topic, lambda event: hear(event[1]))
+        await self._client.register_plugin(work.Prepared())  # pyright: ignore
+        self.failure = None
         self.ready.set()
 
     async def close(self) -> None:
@@ -98,6 +102,7 @@ class Cluster:
             key=f"coopnav-{job}-{number}-{secrets.token_hex(4)}",
             workers=[worker] if worker else None,
             allow_other_workers=bool(worker),
+            priority=1 if shard.trials[0] == 0 else 0,
             pure=False,
         )
         try:

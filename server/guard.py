@@ -14,6 +14,8 @@ from server.problems import Refusal, response
 from server.settings import Settings, is_loopback
 
 COOKIE = "coopnav-token"
+#: A body of up to this many times the limit is heard to its end before it is refused.
+PATIENCE = 8
 SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
 
 PAGE_POLICY = (
@@ -101,26 +103,29 @@ class Guard:
         await answer(scope, receive, _with_headers(send))
 
     async def _body(self, headers: Headers, receive: Receive) -> bytes | Refusal:
-        """The whole body, or the refusal of one too large; no request here needs to be streamed in."""
+        """The whole body, or the refusal of one too large; no request here needs to be streamed in.
+
+        What is too large is still taken in for a while and thrown away: a client that is busy sending would
+        not hear the answer.
+        """
         limit = self.settings.largest_body
-        too_large = Refusal(
-            413, "too-large", f"a request may carry at most {limit} bytes", headers={"connection": "close"}
-        )
         length = headers.get("content-length", "0")
-        if not length.isdigit() or int(length) > limit:
-            return too_large
+        declared = int(length) if length.isdigit() and len(length) < 20 else limit + 1
         parts: list[bytes] = []
         size = 0
-        while True:
+        while declared <= PATIENCE * limit and size <= PATIENCE * limit:
             message = await receive()
             if message["type"] != "http.request":
                 return b""
-            parts.append(message.get("body", b""))
-            size += len(parts[-1])
-            if size > limit:
-                return too_large
+            size += len(message.get("body", b""))
+            if max(size, declared) <= limit:
+                parts.append(message.get("body", b""))
             if not message.get("more_body"):
-                return b"".join(parts)
+                break
+        if max(size, declared) <= limit:
+            return b"".join(parts)
+        found = f"a request may carry at most {limit} bytes"
+        return Refusal(413, "too-large", found, headers={"connection": "close"})
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:

@@ -14,28 +14,30 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from distributed import CancelledError as Lost
 from distributed import KilledWorker
+from distributed.comm.core import CommClosedError
 
 from engine import runner
 from engine.runner import Shard
 from engine.scenario import toml
 from engine.scenario.errors import Problem, ScenarioError
 from engine.scenario.models import ScenarioBase
-from server import artifacts, view
+from server import artifacts, view, work
 from server.cluster import Cluster
 from server.journal import Journal
 from server.problems import Refusal
 from server.settings import Settings
 from server.store import FINAL, Job, Store
+from server.watch import Watch
 from server.wire import dumps
 
 log = logging.getLogger(__name__)
 
+LOST = (Lost, CommClosedError)
 OUTLINE, VIEW = "outline.json", "view.json"
 #: Report times assumed when a result's size is estimated before it runs.
 USUAL_TIMES = 800
-#: Progress of a job is told at most this often.
-PROGRESS_S = 0.1
 
 
 def now() -> str:
@@ -51,7 +53,7 @@ class Jobs:
         self._cluster, self._settings = cluster, settings
         self._folder = settings.data / "jobs"
         self._tasks: dict[str, asyncio.Task[None]] = {}
-        self._running: dict[str, _Watch] = {}
+        self._running: dict[str, Watch] = {}
 
     def start(self) -> None:
         """Take up the jobs accepted before a restart; they run once the cluster is ready."""
@@ -114,7 +116,8 @@ class Jobs:
         task = self._tasks.get(id)
         if changed is not None and task is not None:
             task.cancel()
-            await self._cluster.cancel(id)
+            if self._cluster.ready.is_set():
+                await self._cluster.cancel(id)
             await asyncio.gather(task, return_exceptions=True)
             self._drop_shards(id)
         return self.find(id)
@@ -204,14 +207,15 @@ class Jobs:
         scenario = toml.loads(job.toml, origin=job.origin)
         shards = runner.shards(scenario, job.algorithms)
         finished = set(self.store.shards(job.id))
-        watch = self._running[job.id] = _Watch(job, len(shards), finished, self.journal, folder / OUTLINE)
+        watch = self._running[job.id] = Watch(job, len(shards), finished, self.journal, folder / OUTLINE)
         watch.resume(self.store)
         if job.state == "queued":
             await asyncio.to_thread(self.store.change, job.id, state="running", started_at=now())
             self.journal.wake()
 
-        homes = _homes(shards, await self._cluster.workers())
-        room = asyncio.Semaphore(max(4 * self._settings.workers, 8))
+        workers = await self._cluster.workers()
+        homes = _homes(shards, workers)
+        room = asyncio.Semaphore(2 * max(self._settings.workers, len(workers)))
 
         async def run(number: int, shard: Shard) -> None:
             async with room:
@@ -229,7 +233,7 @@ class Jobs:
                 for number, shard in enumerate(shards):
                     if number not in finished:
                         group.create_task(run(number, shard))
-        except* Exception as errors:
+        except BaseExceptionGroup as errors:
             await self._cluster.cancel(job.id)
             raise errors.exceptions[0] from None
         notes = await asyncio.to_thread(self._assemble, job, scenario)
@@ -243,8 +247,7 @@ class Jobs:
         parts = self._parts(job)
         result = runner.gather(scenario, parts, job.algorithms)
         folder = self._folder / job.id
-        outline = self.outline(job.id)
-        assert outline is not None, "the shards of trial 0 tell the outline before they finish"
+        outline = self.outline(job.id) or work.outline(scenario)
         artifacts.write_text(folder / VIEW, dumps(view.build(outline, parts, job.algorithms)))
         artifacts.write_result(folder, result)
         return [f"{name}: {note}" for name, tracks in result.tracks.items() for note in tracks.notes]
@@ -262,70 +265,6 @@ class Jobs:
             path.unlink(missing_ok=True)
 
 
-class _Watch:
-    """How far a running job is, as told by its shards."""
-
-    def __init__(self, job: Job, shards: int, finished: set[int], journal: Journal, outline: Path) -> None:
-        self._job, self._journal, self._outline = job, journal, outline
-        self._told = dict.fromkeys(finished, 1.0)
-        self._shards, self._done = shards, set(finished)
-        self._last: dict[str, float] = {}
-        self._said = -math.inf
-
-    @property
-    def fraction(self) -> float:
-        """The share of the work done."""
-        return sum(self._told.values()) / self._shards
-
-    def resume(self, store: Store) -> None:
-        """Learn which estimates were told before a restart."""
-        after = 0
-        while events := store.events(self._job.id, after):
-            after = events[-1].id
-            for event in events:
-                if event.kind == "estimates":
-                    data = json.loads(event.data)
-                    self._last[data["algorithm"]] = data["time_s"][-1]
-
-    def hear(self, message: dict[str, Any]) -> None:
-        number = message["number"]
-        if message["outline"] is not None and not self._outline.exists():
-            artifacts.write_text(self._outline, dumps(message["outline"]))
-            self._journal.wake()
-        if message["partial"]:
-            self._estimates(message["algorithm"], message["partial"])
-        self._told[number] = max(self._told.get(number, 0.0), min(message["fraction"], 1.0))
-        self._progress()
-
-    def finish(self, number: int) -> None:
-        self._told[number] = 1.0
-        self._done.add(number)
-        self._progress(always=True)
-
-    def _estimates(self, algorithm: str, partial: dict[str, Any]) -> None:
-        """Pass on points later than those passed on before: a shard that runs again tells them again."""
-        last = self._last.get(algorithm, -math.inf)
-        times = partial["time_s"]
-        start = next((i for i, t in enumerate(times) if t > last), len(times))
-        if start == len(times):
-            return
-        self._last[algorithm] = times[-1]
-        new = {"algorithm": algorithm, "time_s": times[start:]}
-        for what, digits in (("mean", 3), ("cov", 6)):
-            new[what] = {
-                subject: [[round(x, digits) for x in row] for row in rows[start:]]
-                for subject, rows in partial[what].items()
-            }
-        self._journal.say(self._job.id, "estimates", new)
-
-    def _progress(self, always: bool = False) -> None:
-        moment = asyncio.get_running_loop().time()
-        if always or moment - self._said >= PROGRESS_S:
-            self._said = moment
-            done = {"fraction": self.fraction, "shards_done": len(self._done), "shards": self._shards}
-            self._journal.say(self._job.id, "progress", done)
-
-
 def _homes(shards: list[Shard], workers: list[str]) -> dict[int, str]:
     """A worker for every block of trials, so that its mission is flown once; none where blocks are few."""
     blocks = list(dict.fromkeys(s.trials[0] for s in shards))
@@ -340,6 +279,8 @@ def _told(error: BaseException) -> dict[str, str]:
         return {"title": "The scenario cannot be run", "detail": str(error)}
     if isinstance(error, KilledWorker):
         return {"title": "A worker died", "detail": "a part of the job ended its worker process several times"}
+    if isinstance(error, LOST):
+        return {"title": "The cluster was lost", "detail": "its scheduler went away while the job ran; run it again"}
     if isinstance(error, FileNotFoundError):
         return {"title": "A file is missing", "detail": str(error)}
     return {"title": "An estimator failed", "detail": f"{type(error).__name__}: {error}"}

@@ -27,7 +27,7 @@ td:first-child,th:first-child,td:nth-child(2),th:nth-child(2){text-align:left}
 td.text{white-space:normal}tr{border-bottom:1px solid #e5e9ee}.yes{color:#00735a}.no{color:#b3420a;font-weight:600}
 svg{max-width:100%;height:auto}.legend span{margin-right:1.2rem}.legend i{display:inline-block;width:1.4em;height:.3em;
 margin-right:.4em;vertical-align:middle}pre{background:#f3f5f8;padding:1rem;overflow:auto;font-size:13px}
-.pair{display:flex;flex-wrap:wrap;gap:1rem}
+.pair{display:flex;flex-wrap:wrap;gap:1rem}.pair>div{flex:1 1 26rem;min-width:0}
 """
 
 

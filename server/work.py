@@ -13,6 +13,7 @@ from distributed.diagnostics.plugin import WorkerPlugin
 from engine import registry, runner
 from engine.runner import Shard
 from engine.scenario import toml
+from engine.scenario.models import ScenarioBase
 from engine.tracks import Reference, Tracks
 
 _cancelled: set[str] = set()
@@ -50,7 +51,7 @@ def run(topic: str, job: str, number: int, text: str, origin: str, shard: Shard)
     worker = get_worker()
     watched = shard.trials[0] == 0
 
-    def tell(fraction: float, partial: Any = None, outline: Any = None) -> None:
+    def tell(fraction: float, partial: Any = None, *, outline: Any = None) -> None:
         if job in _cancelled:
             raise Cancelled
         message = {
@@ -68,13 +69,18 @@ def run(topic: str, job: str, number: int, text: str, origin: str, shard: Shard)
         tell(0.0)
         mission = runner.prepare(scenario, shard.trials)
         if watched:
-            tell(0.0, outline=_outline(scenario.family, mission))
+            tell(0.0, outline=outlined(scenario.family, mission))
         return runner.run_shard(scenario, shard, tell)
     except Cancelled:
         return None
 
 
-def _outline(family: str, mission: Any) -> dict[str, Any]:
+def outline(scenario: ScenarioBase) -> dict[str, Any]:
+    """A mission's outline, flown here for it."""
+    return outlined(scenario.family, runner.prepare(scenario, (0,)))
+
+
+def outlined(family: str, mission: Any) -> dict[str, Any]:
     """The first trial as a watcher sees it: times, truth, subjects, events."""
     outline = registry.families()[family].outline(mission)
     return {

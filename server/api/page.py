@@ -29,6 +29,11 @@ def index() -> FileResponse:
     return static("index.html")
 
 
+@router.get("/favicon.ico")
+def icon() -> FileResponse:
+    return static("icon.svg")
+
+
 @router.get("/static/{path:path}")
 def static(path: str) -> FileResponse:
     """A file of the page, asked for anew each time, for it has no version in its name."""

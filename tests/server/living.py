@@ -86,8 +86,8 @@ class Live:
         return found
 
 
-def start(settings: Settings) -> Iterator[Live]:
-    """Serve in a thread of this process until the test is over."""
+def start(settings: Settings, ready: Callable[[Any], Any] = lambda health: health["ready"]) -> Iterator[Live]:
+    """Serve in a thread of this process until the test is over; yields once the server's health is as wanted."""
     listener = listen(settings)
     port = listener.getsockname()[1]
     app = create_app(settings)
@@ -96,14 +96,7 @@ def start(settings: Settings) -> Iterator[Live]:
     thread.start()
     url = f"http://127.0.0.1:{port}"
     with httpx.Client(base_url=url, timeout=PATIENCE_S) as http:
-
-        def ready() -> bool:
-            try:
-                return http.get("/api/health").json()["ready"]
-            except httpx.TransportError:
-                return False
-
-        until(ready, "the server")
+        until(lambda: ready(http.get("/api/health").json()), "the server")
         yield Live(url, http, settings, app)
     server.should_exit = True
     thread.join(PATIENCE_S)
