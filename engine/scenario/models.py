@@ -40,7 +40,7 @@ class Table(BaseModel):
         fields = {f.alias or name: f for name, f in cls.model_fields.items() if f.exclude is not True}
         problems = []
         for key in data:
-            if key not in fields and key != "origin":
+            if key not in fields and key not in cls.model_fields:
                 near = difflib.get_close_matches(str(key), fields, n=1)
                 remedy = f"did you mean {near[0]!r}?" if near else f"the keys here are: {', '.join(fields)}"
                 problems.append(Problem(str(key), "is not a key of this table", remedy))

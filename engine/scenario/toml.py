@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -55,22 +56,37 @@ def validate(data: Any, *, origin: str = "") -> ScenarioBase:
     """The scenario that nested tables describe. Raises ScenarioError with every problem found."""
     if not isinstance(data, dict):
         raise ScenarioError([Problem("", "a scenario is a table", "give the keys of a scenario file")])
-    problems = []
-    if data.get("schema") != 1 or isinstance(data.get("schema"), bool):
-        found = f"is {data['schema']!r}" if "schema" in data else "is missing"
+    problems: list[Problem] = []
+    if data.get("schema") != 1 or not isinstance(data["schema"], int) or isinstance(data["schema"], bool):
+        found = f"is {_shown(data['schema'])}" if "schema" in data else "is missing"
         problems.append(Problem("schema", found, "write schema = 1"))
     family = str(data.get("family"))
     if family not in MODELS:
         found = f"is {_shown(data['family'])}" if "family" in data else "is missing"
         problems.append(Problem("family", found, f"use one of: {', '.join(MODELS)}"))
-    if problems:
-        raise ScenarioError(problems)
+    if "origin" in data:
+        problems.append(Problem("origin", "is not a key of this table", "leave it out"))
     try:
+        problems += [Problem(key, f"is {number}", "give a finite number") for key, number in _not_finite(data, "")]
+        if problems:
+            raise ScenarioError(problems)
         return MODELS[family].model_validate(data | {"origin": origin})
     except ValidationError as error:
         raise ScenarioError(_problems(error, data)) from None
     except RecursionError:
         raise ScenarioError([Problem("", "this is nested too deeply", "write a plain scenario")]) from None
+
+
+def _not_finite(place: Any, key: str) -> Iterator[tuple[str, float]]:
+    """Every NaN or infinity in nested tables, by key path."""
+    if isinstance(place, dict):
+        for name, value in place.items():
+            yield from _not_finite(value, _join(key, str(name)))
+    elif isinstance(place, list):
+        for i, value in enumerate(place):
+            yield from _not_finite(value, f"{key}[{i}]")
+    elif isinstance(place, float) and not math.isfinite(place):
+        yield key, place
 
 
 def dumps(scenario: ScenarioBase) -> str:
