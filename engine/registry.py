@@ -9,6 +9,8 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
 
+from pydantic import BaseModel
+
 from engine.tracks import Tracks
 
 ENTRY_POINT_GROUP = "coopnav.algorithms"
@@ -27,7 +29,8 @@ class Algorithm:
 
     `run(mission, progress)` takes what the family's `fly` produced for a block of trials and returns its
     Tracks. `centralized` marks benchmarks that see what no vehicle could; `assumes` says in words what the
-    algorithm needs of the network (topology, loss, direction).
+    algorithm needs of the network (topology, loss, direction); `options` is the model of what a scenario may
+    choose for it under [options.NAME].
     """
 
     name: str
@@ -38,6 +41,7 @@ class Algorithm:
     run: Callable[[Any, Progress], Tracks]
     centralized: bool = False
     assumes: tuple[str, ...] = ()
+    options: type[BaseModel] | None = None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from pydantic import ValidationError
+
 from engine import registry
 from engine.evaluation.result import Result, assemble
 from engine.registry import Progress, silent
@@ -69,9 +71,29 @@ def chosen(scenario: ScenarioBase, algorithms: Sequence[str] | None = None) -> l
             )
     if not names:
         problems.append(Problem("algorithms", "no algorithm to run", "name at least one"))
+    problems += _faulty_options(scenario)
     if problems:
         raise ScenarioError(problems)
     return names
+
+
+def _faulty_options(scenario: ScenarioBase) -> list[Problem]:
+    """What is wrong under [options.NAME]."""
+    problems = []
+    for name, values in scenario.options.items():
+        algorithm = registry.algorithms().get(name)
+        if algorithm is None or algorithm.options is None:
+            having = ", ".join(a.name for a in registry.algorithms().values() if a.options is not None)
+            problems.append(Problem(f"options.{name}", "is no algorithm with options", f"those with options: {having}"))
+            continue
+        try:
+            algorithm.options(**values)
+        except ValidationError as error:
+            known = ", ".join(algorithm.options.model_fields)
+            for fault in error.errors(include_input=False, include_url=False):
+                key = ".".join(["options", name, *map(str, fault["loc"])])
+                problems.append(Problem(key, fault["msg"], f"the options of {name} are: {known}"))
+    return problems
 
 
 def shards(scenario: ScenarioBase, algorithms: Sequence[str] | None = None) -> list[Shard]:

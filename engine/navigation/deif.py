@@ -264,5 +264,6 @@ DEIF = Algorithm(
     summary="Servers send delta information, clients rebuild the server's graph: exact, until a packet is lost.",
     source="Walls and Eustice 2011, section II-D; Webster et al. 2010",
     run=run,
+    options=Options,
     assumes=("one server, its clients silent (topologies B and D)", "no lost packets"),
 )

@@ -458,5 +458,6 @@ MDEIF = Algorithm(
     summary="DEIF whose packets refer to an acknowledged origin state: a lost packet costs only its own range.",
     source="Walls and Eustice 2012",
     run=run,
+    options=Options,
     assumes=("clients answer now and then, to move the origin",),
 )

@@ -58,6 +58,20 @@ def test_algorithms_that_cannot_be_run_are_named_before_anything_is(algorithms, 
         runner.run(short(), algorithms, workers=1)
 
 
+@pytest.mark.parametrize(
+    ("options", "key"),
+    [
+        ({"deif": {"redundancy": 99}}, "options.deif.redundancy"),
+        ({"deif": {"delayed": "xy"}}, "options.deif.delayed"),
+        ({"cekf": {"x": 1}}, "options.cekf"),
+        ({"nobody": {}}, "options.nobody"),
+    ],
+)
+def test_options_an_algorithm_does_not_have_are_named_before_anything_runs(options, key):
+    with pytest.raises(ScenarioError, match=key.replace(".", r"\.")):
+        runner.run(short().model_copy(update={"options": options}), ["deif"], workers=1)
+
+
 def test_progress_ends_at_one_and_never_goes_back():
     told: list[float] = []
     runner.run(short(1), ["dead_reckoning", "nekf"], workers=1, progress=told.append)
