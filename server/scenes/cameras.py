@@ -1,4 +1,4 @@
-"""Panes of a session that look at their scenes from the same place."""
+"""The one place from which all panes of a session look at their scenes."""
 
 from __future__ import annotations
 
@@ -8,14 +8,22 @@ import time
 import numpy as np
 import viser
 
+from server.scenes.geometry import SPAN
 from server.scenes.pane import Pane
+
+OBLIQUE = np.concatenate([np.array([0.0, -0.9, 1.12]) * SPAN, np.zeros(3)])
+ABOVE = np.concatenate([np.array([0.0, -0.01, 1.45]) * SPAN, np.zeros(3)])
 
 #: While one pane's camera moves, and this long after, the others follow and do not lead.
 LEAD_S = 0.3
+#: A viewer that has not come to the pose it was given by then is being moved by its user.
+SETTLE_S = 2.0
+#: Poses closer than this (scene units) are the same.
+SAME = 0.01
 
 
 class Cameras:
-    """Passes one pane's camera on to the others; the pane moved last leads until it rests."""
+    """Position and point looked at, (6,) scene units, shared by all viewers; the pane moved last leads."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -23,45 +31,58 @@ class Cameras:
         self._leader: Pane | None = None
         self._moved = 0.0
         self._again: asyncio.TimerHandle | None = None
+        self.pose = OBLIQUE
 
     def join(self, pane: Pane) -> None:
-        """Let a pane's viewers lead and follow; a viewer's first message is where it started, not a movement."""
+        """Give a pane's viewers the shared pose and let them lead.
+
+        A viewer starts where viser's client puts it and says so, more than once; it is heard only when it has
+        come to the pose it was given.
+        """
         self._panes.append(pane)
+        pane.begin_at(self.pose)
 
         @pane.server.on_client_connect
         def connected(client: viser.ClientHandle) -> None:
-            started = False
+            _turn(client, self.pose)
+            deadline, settled = time.monotonic() + SETTLE_S, False
 
             @client.camera.on_update
             def moved(camera: viser.CameraHandle) -> None:
-                nonlocal started
-                if started:
-                    pose = np.concatenate([camera.position, camera.look_at])
+                nonlocal settled
+                pose = np.concatenate([camera.position, camera.look_at])
+                if settled:
                     self._loop.call_soon_threadsafe(self._lead, pane, pose)
-                started = True
+                settled = settled or np.allclose(pose, self.pose, atol=SAME) or time.monotonic() > deadline
 
     def leave(self, pane: Pane) -> None:
         self._panes.remove(pane)
         if self._leader is pane:
             self._leader = None
 
+    def move(self, pose: np.ndarray) -> None:
+        """Turn all viewers to a pose (6,)."""
+        self.pose, self._leader, self._moved = pose, None, time.monotonic()
+        self._follow()
+
     def _lead(self, pane: Pane, pose: np.ndarray) -> None:
         now = time.monotonic()
-        if self._leader is not pane and now - self._moved < LEAD_S:
+        if np.allclose(pose, self.pose, atol=SAME) or (self._leader is not pane and now - self._moved < LEAD_S):
             return
-        self._leader, self._moved = pane, now
-        self._follow(pose)
+        self.pose, self._leader, self._moved = pose, pane, now
+        self._follow()
         if self._again is not None:
             self._again.cancel()
-        self._again = self._loop.call_later(LEAD_S / 2, self._follow, pose)
+        self._again = self._loop.call_later(LEAD_S, self._follow)
 
-    def _follow(self, pose: np.ndarray) -> None:
+    def _follow(self) -> None:
         for pane in self._panes:
-            if pane is self._leader:
-                continue
-            for client in pane.server.get_clients().values():
-                if not np.allclose(np.concatenate([client.camera.position, client.camera.look_at]), pose, atol=1e-4):
-                    self._moved = time.monotonic()
-                    with client.atomic():
-                        client.camera.position = pose[:3]
-                        client.camera.look_at = pose[3:]
+            if pane is not self._leader:
+                for client in pane.server.get_clients().values():
+                    _turn(client, self.pose)
+
+
+def _turn(client: viser.ClientHandle, pose: np.ndarray) -> None:
+    with client.atomic():
+        client.camera.position = pose[:3]
+        client.camera.look_at = pose[3:]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import rich
@@ -21,7 +21,6 @@ SMALLEST = 0.02
 #: A ray is seen for this share of the mission, and at least this long.
 RAY_SHARE, RAY_S = 0.006, 3.0
 
-OBLIQUE, ABOVE = np.array([0.0, -0.9, 1.12]) * SPAN, np.array([0.0, -0.01, 1.35]) * SPAN
 FIELD_OF_VIEW = np.radians(50.0)
 
 
@@ -43,8 +42,6 @@ class Pane:
         rich.get_console().quiet = True
         self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self._lock = threading.Lock()
-        self._followed: np.ndarray | None = None
-        self._options = Options()
         self.footage: Footage
         self._chart: Chart
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -53,8 +50,6 @@ class Pane:
         scene.configure_default_lights(enabled=True, cast_shadow=False)
         scene.add_light_ambient("/light", intensity=2.0)
         scene.set_background_image(np.full((2, 2, 3), palette.WATER, dtype=np.uint8), format="png")
-        self.server.initial_camera.position = tuple(OBLIQUE)
-        self.server.initial_camera.look_at = (0.0, 0.0, 0.0)
         self.server.initial_camera.fov = FIELD_OF_VIEW
 
     @property
@@ -63,6 +58,11 @@ class Pane:
 
     def close(self) -> None:
         self.server.stop()
+
+    def begin_at(self, pose: np.ndarray) -> None:
+        """Let new viewers look from a position at a point, together (6,)."""
+        self.server.initial_camera.position = pose[:3]
+        self.server.initial_camera.look_at = pose[3:]
 
     def stage(self, footage: Footage, chart: Chart) -> None:
         """Send what stands still: the sea surface, the true tracks, the vehicles with their names."""
@@ -122,7 +122,6 @@ class Pane:
             self._present(algorithm, moment_s, now, truth)
             self._rays(moment_s, now, truth, options)
             self._place(now, truth)
-        self._camera(now, options)
 
     def _trails(self, algorithm: str, moment_s: float, now: dict[str, np.ndarray], options: Options) -> None:
         """Estimated tracks up to the moment, and the ellipses along them."""
@@ -194,26 +193,6 @@ class Pane:
                     handle.position = self._chart.place(places[name], self._depth(name))
                 if handle.visible != known:
                     handle.visible = known
-
-    def _camera(self, now: dict[str, np.ndarray], options: Options) -> None:
-        """Go along with the vehicle that is followed; look from above, or obliquely again, when asked."""
-        clients = list(self.server.get_clients().values())
-        if options.top != self._options.top:
-            place = ABOVE if options.top else OBLIQUE
-            for camera in (self.server.initial_camera, *(client.camera for client in clients)):
-                # Moving a camera moves what it looks at along with it: position first.
-                camera.position = tuple(place)
-                camera.look_at = (0.0, 0.0, 0.0)
-        target = now.get(options.follow) if options.follow else None
-        if target is None or not np.isfinite(target).all():
-            self._followed = None
-        else:
-            place = self._chart.place(target)
-            for client in clients:
-                step = place - (client.camera.look_at if self._followed is None else self._followed)
-                client.camera.position = client.camera.position + step * np.array([1.0, 1.0, 0.0])
-            self._followed = place
-        self._options = replace(options)
 
     def _depth(self, subject: str) -> float:
         return next((s["depth_m"] for s in self.footage.subjects if s["name"] == subject), 0.0) or 0.0

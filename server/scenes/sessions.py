@@ -15,8 +15,8 @@ import numpy as np
 
 from server.jobs import Jobs
 from server.problems import Refusal
-from server.scenes.cameras import Cameras
-from server.scenes.footage import Footage, footage
+from server.scenes.cameras import ABOVE, OBLIQUE, Cameras
+from server.scenes.footage import Footage, at, footage
 from server.scenes.geometry import Chart, chart
 from server.scenes.pane import Options, Pane
 from server.settings import Settings
@@ -78,6 +78,7 @@ class Session:
         self._footage: Footage | None = None
         self._chart: Chart | None = None
         self._moment: float | None = None
+        self._followed: np.ndarray | None = None
         self._stale = asyncio.Event()
         self._drawing = asyncio.Lock()
         self._painter = asyncio.create_task(self._paint())
@@ -151,6 +152,8 @@ class Session:
                 raise ValueError(
                     f"option {key}: {'a name or null' if key == 'follow' else 'true or false'} is expected"
                 )
+        if chosen.get("top", self._options.top) != self._options.top:
+            self._cameras.move(ABOVE if chosen["top"] else OBLIQUE)
         self._options = replace(self._options, **chosen)
         self._stale.set()
 
@@ -219,7 +222,26 @@ class Session:
                     log.exception("a 3D pane could not be drawn")
                     await self._send({"type": "error", "detail": BROKEN})
                     continue
+                self._steer(moment)
             await self._send({"type": "at", "time_s": moment})
+
+    def _steer(self, moment: float) -> None:
+        """Go along with the vehicle that is followed: with its true position, else the first pane's estimate."""
+        assert self._footage is not None and self._chart is not None
+        name, place = self._options.follow, None
+        if name in self._footage.truth:
+            place = at(self._footage.time_s, self._footage.truth[name], moment)
+        elif name is not None and self._panes:
+            track = self._footage.tracks[next(iter(self._panes))]
+            place = at(track.time_s, track.mean[name], moment) if name in track.mean else None
+        if place is None or not np.isfinite(place).all():
+            self._followed = None
+            return
+        target = self._chart.place(place)
+        step = target - (self._cameras.pose[3:] if self._followed is None else self._followed)
+        step[2], self._followed = 0.0, target
+        if np.abs(step).max() > 1e-6:
+            self._cameras.move(self._cameras.pose + np.concatenate([step, step]))
 
     def _show_panes(self, moment: float) -> None:
         for name, (_, pane) in self._panes.items():

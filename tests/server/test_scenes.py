@@ -14,6 +14,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from server.scenes import relay
+from server.scenes.cameras import ABOVE, OBLIQUE
 from tests.server.living import PATIENCE_S, SHORT, Live, until
 
 
@@ -122,9 +123,10 @@ def test_a_request_for_a_public_tunnel_does_not_get_through(live: Live, job: str
         server = live.app.state.site.scenes.panes[path.split("/")[2]].server
         with viewer(live, path) as socket:
             socket.recv(timeout=PATIENCE_S)
+            socket.send(camera(position=(3.0, 3.0, 3.0)))
+            until(lambda: server.get_clients(), "the viewer")
             socket.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
             socket.send(camera(position=(1.0, 2.0, 3.0)))
-            until(lambda: server.get_clients(), "the viewer")
             (client,) = server.get_clients().values()
             until(lambda: tuple(client.camera.position) == (1.0, 2.0, 3.0), "the camera, sent after the request")
     assert asked == []
@@ -152,10 +154,13 @@ def test_the_other_panes_follow_the_camera_of_one(live: Live, job: str):
         servers = [live.app.state.site.scenes.panes[p.split("/")[2]].server for p in panes.values()]
         with viewer(live, panes["cekf"]) as one, viewer(live, panes["nekf"]) as other:
             for socket, server in ((one, servers[0]), (other, servers[1])):
-                socket.send(camera(position=(0.0, -9.0, 9.0)))
+                socket.send(camera(position=(3.0, 3.0, 3.0)))
                 until(lambda server=server: server.get_clients(), "the viewer")
-            one.send(camera(position=(4.0, 5.0, 6.0)))
+                socket.send(camera(position=(3.0, 3.0, 3.1)))
+                socket.send(camera(position=tuple(OBLIQUE[:3])))
             (follower,) = servers[1].get_clients().values()
+            assert tuple(follower.camera.position) != (3.0, 3.0, 3.1)
+            one.send(camera(position=(4.0, 5.0, 6.0)))
             until(lambda: tuple(follower.camera.position) == (4.0, 5.0, 6.0), "the other pane's camera")
 
 
@@ -209,3 +214,20 @@ def test_panes_are_limited(live: Live, job: str):
 def test_a_page_of_another_site_opens_no_session(live: Live):
     with pytest.raises(InvalidStatus), connect(f"{live.ws}/api/scenes/session", origin="http://evil.example"):
         pass
+
+
+def test_the_camera_goes_along_with_the_vehicle_followed_and_looks_from_above(live: Live, job: str):
+    with session(live) as mine:
+        path = mine.show(job, "cekf")["cekf"]
+        server = live.app.state.site.scenes.panes[path.split("/")[2]].server
+        with viewer(live, path) as socket:
+            socket.send(camera(position=(3.0, 3.0, 3.0)))
+            until(lambda: server.get_clients(), "the viewer")
+            (client,) = server.get_clients().values()
+            mine.say(type="options", top=True)
+            until(lambda: tuple(client.camera.position) == tuple(ABOVE[:3]), "the view from above")
+            mine.say(type="options", follow="scout")
+            mine.say(type="seek", time_s=100.0)
+            until(lambda: mine.hear("at")["time_s"] == 100.0, "the moment asked for")
+            until(lambda: abs(client.camera.look_at[0]) > 0.1, "the vehicle in the middle")
+            assert client.camera.position[0] == pytest.approx(client.camera.look_at[0])
