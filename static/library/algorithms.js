@@ -37,6 +37,8 @@ function entry(algorithm) {
       type: "checkbox",
       name: "algorithm",
       value: algorithm.name,
+      "aria-label": algorithm.title,
+      "aria-description": algorithm.summary,
       onchange: (event) => tick(algorithm.name, event.target.checked),
     }),
     el(

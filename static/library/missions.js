@@ -47,6 +47,8 @@ function entry(mission) {
       type: "radio",
       name: "mission",
       value: mission.name,
+      "aria-label": mission.title,
+      "aria-description": mission.available ? mission.summary : `Cannot run here: ${mission.missing}`,
       disabled: !mission.available,
       onchange: () => pickMission(mission.name),
     }),

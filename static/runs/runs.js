@@ -24,7 +24,7 @@ export function mountRuns() {
     else if (!jobs.length) panel.replaceChildren(el("p", { class: "quiet" }, "No runs yet. They are kept here when they have run."));
     else panel.replaceChildren(el("ul", { class: "runs" }, jobs.map((job) => entry(job, job.id === run))));
   });
-  let known = "";
+  let known = null;
   store.watch(["job"], ({ job }) => {
     const now = job ? `${job.id} ${job.state}` : "";
     if (now !== known) readRuns();

@@ -25,7 +25,7 @@ export async function openRun(id, wanted = {}, known = null) {
   try {
     const job = known ?? (await persist(() => api.findJob(id, signal), signal));
     store.set({ job });
-    if (atWork(job)) {
+    if (job.state !== "done") {
       clock.following = wanted.time_s === undefined || wanted.time_s === null;
       await listen(id, signal);
     }
@@ -78,7 +78,7 @@ function notice(title, text, tone = "bad") {
   store.set({ notices: [...store.state.notices, { title, text, tone }] });
 }
 
-/** Follows a run until it has ended. */
+/** Follows a run until it has ended; of one that has, its estimates are told once more. */
 async function listen(id, signal) {
   let looking = 0;
   let shards = 0;
@@ -90,7 +90,7 @@ async function listen(id, signal) {
     }, VIEW_PAUSE_MS);
   };
   const hear = ({ event, data }) => {
-    if (event === "state") store.set({ job: data });
+    if (event === "state" && (FINAL.has(data.state) || atWork(store.state.job))) store.set({ job: data });
     else if (event === "progress") {
       store.set({ progress: data });
       if (data.shards_done > shards) look();
@@ -147,11 +147,7 @@ function take(view) {
 async function read(id, wanted, signal) {
   const { job } = store.state;
   if (job.state === "failed") notice(job.error?.title ?? "The run failed", job.error?.detail ?? "");
-  if (job.state !== "done") {
-    const view = await viewSoFar(id, signal);
-    if (view && !signal.aborted) settle(view, wanted);
-    return;
-  }
+  if (job.state !== "done") return;
   const [view, result] = await Promise.all([
     persist(() => api.view(id, signal), signal),
     persist(() => api.result(id, signal), signal),
