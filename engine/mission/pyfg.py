@@ -65,10 +65,10 @@ def read_pyfg(scenario: NavigationScenario, folder: Path) -> Recording:
             reference[name] = Course(poses[:, 0], poses[:, 1:3], poses[:, 3], mission.max_gap_s)
     nodes = {name: _point(graph, key, mission) for key, name in mission.nodes.items()}
 
-    receptions, beacon = _receptions(scenario, graph, mission)
+    receptions, beacon, repeats = _receptions(scenario, graph, mission)
     if mission.moving_beacon is not None:
         sensed[mission.moving_beacon] = Sensed(fixes=_beacon_fixes(graph, beacon, mission))
-    notes = []
+    notes = [f"{repeats} ranges stand in the file twice and are used once"] if repeats else []
     if mission.reference == "own_navigation":
         notes.append("the reference is the vehicle's own navigation, no independent truth: its errors prove nothing")
     if mission.landmarks != "off":
@@ -195,13 +195,19 @@ def _odometry(scenario: NavigationScenario, graph: Graph, letter: str, name: str
 
 def _receptions(
     scenario: NavigationScenario, graph: Graph, mission: PyfgRecording
-) -> tuple[list[Reception], list[tuple[float, str]]]:
-    """Every range as a broadcast heard by its observer, and (time of launch, point) of those from the moving beacon."""
+) -> tuple[list[Reception], list[tuple[float, str]], int]:
+    """Every range as a broadcast heard by its observer, (time of launch, point) of those from the moving beacon, and
+    how many lines only repeat another: the same distance from the same pose to the same place."""
     speed = scenario.network.sound_speed_mps
     found, beacon = [], []
+    seen: set[tuple] = set()
     for observer, target, distance in graph.ranges:
         if observer not in graph.poses:
             _fail("mission.file", f"{mission.file}: a range is measured from {observer}, which is no pose", "drop it")
+        place = tuple(graph.points[target]) if target in graph.points else target
+        if (observer, place, distance) in seen:
+            continue
+        seen.add((observer, place, distance))
         toa = graph.poses[observer][0]
         tol = toa - distance / speed
         if target in graph.poses:
@@ -217,7 +223,7 @@ def _receptions(
         receiver = mission.robots[observer[0]]
         if receiver != sender:
             found.append(Reception(len(found), sender, tol, receiver, toa, distance / speed))
-    return found, beacon
+    return found, beacon, len(graph.ranges) - len(seen)
 
 
 def _beacon_fixes(graph: Graph, launches: list[tuple[float, str]], mission: PyfgRecording) -> Fixes:

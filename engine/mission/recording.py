@@ -159,24 +159,33 @@ def assemble(scenario: NavigationScenario, recording: Recording, trials: Sequenc
 
 
 def _cut(own: Sensed, start: float, duration: float) -> Sensed:
-    """Readings within the mission, on its clock; an increment that began before the start is left out."""
+    """Readings within the mission, on its clock, with what the start and the end need of their neighbours."""
     kept = {}
     for name in ("velocity", "heading", "odometry", "depth", "fixes"):
         sensor = getattr(own, name)
         if sensor is None:
             continue
         time_s = sensor.time_s - start
-        inside = (time_s >= 0) & (time_s <= duration)
-        if name == "odometry":
-            inside &= np.concatenate([[True], time_s[:-1] >= 0])
-        if not inside.any():
+        first = int(np.searchsorted(time_s, 0.0, side="left"))
+        last = int(np.searchsorted(time_s, duration, side="right"))
+        if first == last == len(time_s) or (first == last and name != "odometry"):
             continue
-        if name == "heading" and not inside.all():
+        if name == "heading" and time_s[first] > 0:
             # The heading in force at the start is the last one before it.
-            inside[max(int(np.argmax(inside)) - 1, 0)] = True
+            first = max(first - 1, 0)
+        if name == "odometry":
+            # The increment over the end is needed up to there.
+            last = min(last + 1, len(time_s))
+        inside = slice(first, last)
         parts = {"time_s": time_s[inside], "value": sensor.value[:, inside]}
         if hasattr(sensor, "cov"):
             parts["cov"] = sensor.cov[inside]
+        if name == "odometry" and first > 0 and time_s[first] > 0 > time_s[first - 1]:
+            # Of the increment over the start, only what comes after it.
+            share = time_s[first] / (time_s[first] - time_s[first - 1])
+            parts["value"], parts["cov"] = parts["value"].copy(), parts["cov"].copy()
+            parts["value"][:, 0] *= share
+            parts["cov"][0] *= share
         kept[name] = replace(sensor, **parts)
     return Sensed(**kept)
 

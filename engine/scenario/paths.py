@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from engine.scenario.models import Coordinate, NotNegative, Point, Table
+from engine.scenario.errors import Problem
+from engine.scenario.models import Coordinate, NotNegative, Point, Table, faults
 
 Speed = Annotated[float, Field(gt=0, le=100)]
 Length = Annotated[float, Field(gt=0, le=1e6)]
@@ -20,6 +21,14 @@ class Waypoints(Table):
     speed_mps: Speed = Field(description="speed over ground, m/s")
     turn_radius_m: NotNegative = Field(10.0, description="radius of turns, m (less where legs are too short for it)")
     repeat: bool = Field(False, description="go back to the first point and round again")
+
+    @model_validator(mode="after")
+    def _leads_somewhere(self) -> Waypoints:
+        if all(point == self.points_m[0] for point in self.points_m):
+            raise faults(
+                [Problem("points_m", "is the same point again and again", "give another one, or use a station")]
+            )
+        return self
 
 
 class LawnMower(Table):

@@ -27,7 +27,7 @@ def test_the_first_one_is_the_quick_look():
 
 @pytest.mark.parametrize("name", W11)
 def test_the_w11_scenarios_have_the_papers_sensors_schedule_and_path(name):
-    """W12 table 1 and W11 section III: 145 s cycles, 4 broadcasts of each AUV, 6 of the ship, 500 m lines 50 m apart."""
+    """W12 table 1, W11 section III: 145 s cycles, 4 broadcasts of each AUV, 6 of the ship, 500 m lines 50 m apart."""
     scenario = library.find(name)
     assert scenario.duration_s == 7200
     senders = [slot.vehicle for slot in scenario.network.tdma.slots]
