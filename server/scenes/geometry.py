@@ -39,11 +39,18 @@ def chart(points_m: np.ndarray, deepest_m: float) -> Chart:
     return Chart((low + high) / 2, scale, stretch)
 
 
-def segments(line: np.ndarray, dashed: bool = False) -> np.ndarray:
-    """A line through points (N, 3) as segments (M, 2, 3), left out where a point is not finite; dashed: every other."""
+def segments(line: np.ndarray) -> np.ndarray:
+    """A line through points (N, 3) as segments (M, 2, 3), left out where a point is not finite."""
     pairs = np.stack([line[:-1], line[1:]], axis=1) if len(line) > 1 else np.zeros((0, 2, 3))
-    pairs = pairs[::2] if dashed else pairs
     return pairs[np.isfinite(pairs.sum(axis=(1, 2)))]
+
+
+def dashes(line: np.ndarray) -> np.ndarray:
+    """The segments (M, 2, 3) of a dashed line: dashes and gaps of one length, at least two segments long each."""
+    pairs = segments(line)
+    length = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=-1)
+    dash = max(SPAN / 80, 2 * float(length.mean())) if len(pairs) else 1.0
+    return pairs[(np.cumsum(length) - length) // dash % 2 == 0]
 
 
 def ellipses(chart: Chart, mean_m: np.ndarray, cov_m2: np.ndarray, depth_m: float) -> np.ndarray:

@@ -11,11 +11,11 @@ import viser
 
 from server.scenes import palette
 from server.scenes.footage import Footage, at
-from server.scenes.geometry import SPAN, Chart, ellipses, round_length, segments
+from server.scenes.geometry import SPAN, Chart, dashes, ellipses, round_length, segments
 from server.view import thinned
 
 #: What a browser can draw smoothly even without a graphics card.
-TRACK_POINTS, ELLIPSES, RAYS = 250, 20, 12
+TRACK_POINTS, TRUTH_POINTS, ELLIPSES, RAYS = 250, 600, 20, 12
 #: Ellipses smaller than this (scene units) are not worth their lines.
 SMALLEST = 0.02
 #: A ray is seen for this share of the mission, and at least this long.
@@ -80,12 +80,12 @@ class Pane:
                 section_color=palette.GRID_SECTION,
                 shadow_opacity=0.0,
             )
-            dashes = [
-                segments(chart.place(_thin(track, 2 * TRACK_POINTS), self._depth(subject)), dashed=True)
+            truth = [
+                dashes(chart.place(track[thinned(len(track), TRUTH_POINTS)], self._depth(subject)))
                 for subject, track in footage.truth.items()
                 if self._moves(subject)
             ]
-            self._lines("/truth", dashes, [palette.TRUTH] * len(dashes), 1.5)
+            self._lines("/truth", truth, [palette.TRUTH] * len(truth), 1.5)
             for n, subject in enumerate(footage.subjects):
                 self._vehicle(n, subject)
 
@@ -213,10 +213,6 @@ class Pane:
         if not len(points):
             points, shades = np.full((1, 2, 3), -1000.0, np.float32), np.full((1, 2, 3), palette.WATER, np.uint8)
         self.server.scene.add_line_segments(name, points, shades, thickness=pixels, thickness_units="screen")
-
-
-def _thin(track: np.ndarray, most: int) -> np.ndarray:
-    return track[thinned(len(track), most)]
 
 
 def _visible(rings: np.ndarray) -> np.ndarray:

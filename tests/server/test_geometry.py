@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.scenes.footage import at
-from server.scenes.geometry import CORNERS, SPAN, Chart, chart, ellipses, round_length, segments
+from server.scenes.geometry import CORNERS, SPAN, Chart, chart, dashes, ellipses, round_length, segments
 
 UNIT = Chart(np.zeros(2), 1.0, 1.0)
 
@@ -40,6 +40,15 @@ def test_a_mission_fills_the_scene_and_depth_goes_down():
 def test_segments_leave_gaps_where_nothing_is_known():
     line = np.array([[0.0, 0, 0], [1, 0, 0], [np.nan, 0, 0], [3, 0, 0], [4, 0, 0]])
     assert segments(line).tolist() == [[[0, 0, 0], [1, 0, 0]], [[3, 0, 0], [4, 0, 0]]]
+
+
+def test_half_of_a_dashed_line_is_drawn_in_dashes_of_one_length():
+    line = np.linspace([0.0, 0, 0], [10.0, 0, 0], 801)
+    drawn = dashes(line)
+    assert len(drawn) == pytest.approx(400, abs=10)
+    gaps = np.diff(drawn[:, 0, 0])
+    assert np.count_nonzero(gaps > 0.05) == pytest.approx(39, abs=1)
+    assert gaps.max() < 0.15 and len(dashes(line[:1])) == 0
 
 
 @pytest.mark.parametrize(("metres", "round_"), [(1.0, 1), (1.9, 1), (4.99, 2), (50, 50), (73, 50), (999, 500)])

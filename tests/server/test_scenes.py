@@ -157,7 +157,7 @@ def test_the_other_panes_follow_the_camera_of_one(live: Live, job: str):
                 socket.send(camera(position=(3.0, 3.0, 3.0)))
                 until(lambda server=server: server.get_clients(), "the viewer")
                 socket.send(camera(position=(3.0, 3.0, 3.1)))
-                socket.send(camera(position=tuple(OBLIQUE[:3])))
+                socket.send(camera(position=tuple(OBLIQUE[:3].tolist())))
             (follower,) = servers[1].get_clients().values()
             assert tuple(follower.camera.position) != (3.0, 3.0, 3.1)
             one.send(camera(position=(4.0, 5.0, 6.0)))
