@@ -1,0 +1,1 @@
+"""Cooperative smoothing by factor composition (W15): chains, packets, and the batch smoother behind them."""
