@@ -10,7 +10,7 @@ from engine.scenario.errors import Problem, ScenarioError
 from engine.scenario.recording import CsvRecording, PyfgRecording
 
 DATA_VARIABLE = "COOPNAV_TEST_DATA"
-MAX_BYTES = 500_000_000
+MAX_BYTES = 200_000_000
 #: Recorded logs kept beside a checkout of the project.
 BESIDE_THE_CHECKOUT = Path(__file__).resolve().parents[3] / "shared" / "data"
 

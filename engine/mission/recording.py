@@ -30,7 +30,7 @@ from engine.mission.streams import uniforms
 from engine.mission.vehicle import within
 from engine.scenario.errors import Problem, ScenarioError
 from engine.scenario.models import MAX_DURATION_S
-from engine.scenario.navigation import MAX_REPORTS, NavigationScenario
+from engine.scenario.navigation import MAX_RECEPTIONS, MAX_REPORTS, NavigationScenario
 from engine.scenario.paths import Station
 from engine.scenario.vehicles import OdometrySensor, Vehicle
 
@@ -281,6 +281,9 @@ def _acoustics(
     index = {name: i for i, name in enumerate(scenario.names)}
     allowed = None if scenario.network.links == "all" else {tuple(pair) for pair in scenario.network.links}
     inside = [r for r in receptions if r.tol_s >= start and r.toa_s - start <= duration]
+    if len(inside) > MAX_RECEPTIONS:
+        message = f"{len(inside)} ranges are too many"
+        raise ScenarioError([Problem("duration_s", message, f"at most {MAX_RECEPTIONS}: shorten the mission")])
     launches = sorted({r.broadcast: r for r in inside}.values(), key=lambda r: (r.tol_s, r.broadcast))
     number = {r.broadcast: n for n, r in enumerate(launches)}
     mine = [r for r in inside if r.receiver is not None and (allowed is None or (r.sender, r.receiver) in allowed)]

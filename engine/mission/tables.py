@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.scenario.errors import Problem, ScenarioError
 
-MAX_ROWS = 5_000_000
+MAX_ROWS = 3_000_000
 PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 

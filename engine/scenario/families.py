@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from engine.scenario.models import ScenarioBase
 from engine.scenario.navigation import NavigationScenario
+from engine.scenario.tracking import TrackingScenario
 
 MODELS: dict[str, type[ScenarioBase]] = {
     "navigation": NavigationScenario,
+    "tracking": TrackingScenario,
 }
