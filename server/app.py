@@ -66,7 +66,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     problems.install(app)
     for room in (health, algorithms, scenarios, jobs, tables, scenes, docs, page):
-        app.include_router(room.router)
+        app.include_router(room.router, responses=problems.ANSWERS)
     app.add_middleware(GZipMiddleware, minimum_size=2000, compresslevel=5)
     app.add_middleware(Guard, settings=settings)
     return app

@@ -18,6 +18,29 @@ from server.wire import dumps
 log = logging.getLogger(__name__)
 
 
+#: How the API's description speaks of errors.
+ANSWERS: dict[int | str, dict[str, Any]] = {
+    "4XX": {
+        "description": "What is wrong with the request, as problem+json",
+        "content": {
+            "application/problem+json": {
+                "schema": {
+                    "type": "object",
+                    "required": ["type", "title", "status", "detail"],
+                    "properties": {
+                        "type": {"type": "string"},
+                        "title": {"type": "string"},
+                        "status": {"type": "integer"},
+                        "detail": {"type": "string"},
+                        "errors": {"type": "array", "items": {"type": "object"}},
+                    },
+                }
+            }
+        },
+    }
+}
+
+
 @dataclass
 class Refusal(Exception):
     """A request that cannot be met: HTTP status, kind of problem, and what to tell the person.

@@ -60,7 +60,7 @@ def _operation(path: str, method: str, operation: dict[str, Any], spec: dict[str
         f'<article><h3><span class="method">{method.upper()}</span> <code>{escape(path)}</code></h3>'
         f"<p>{escape(operation.get('description') or operation.get('summary', ''))}</p>"
         + (f"<table>{table}</table>" if table else "")
-        + f"<p>Answers: {escape(answers)}, errors as problem+json.</p></article>"
+        + f"<p>Answers: {escape(answers)} (errors as problem+json)</p></article>"
     )
 
 

@@ -158,8 +158,9 @@ def test_the_other_panes_follow_the_camera_of_one(live: Live, job: str):
                 until(lambda server=server: server.get_clients(), "the viewer")
                 socket.send(camera(position=(3.0, 3.0, 3.1)))
                 socket.send(camera(position=tuple(OBLIQUE[:3].tolist())))
-            (follower,) = servers[1].get_clients().values()
-            assert tuple(follower.camera.position) != (3.0, 3.0, 3.1)
+            (leader,), (follower,) = (server.get_clients().values() for server in servers)
+            for client in (leader, follower):
+                until(lambda client=client: tuple(client.camera.position) == tuple(OBLIQUE[:3]), "the common start")
             one.send(camera(position=(4.0, 5.0, 6.0)))
             until(lambda: tuple(follower.camera.position) == (4.0, 5.0, 6.0), "the other pane's camera")
 
