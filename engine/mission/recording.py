@@ -84,15 +84,34 @@ class Recording:
 
 
 def first_instant(sensed: dict[str, Sensed], receptions: Sequence[Reception], reference: dict[str, Course]) -> float:
-    """Time zero where nobody states one: the earliest reading, or the reference just before it."""
-    times = [s.time_s[0] for own in sensed.values() for s in _sensors(own)] + [r.tol_s for r in receptions]
-    times += [] if times else [c.time_s[0] for c in reference.values()]
+    """Time zero where nobody states one: the earliest reading, or the reference just before it.
+
+    An increment of odometry began before its reading: at the reference just before it, else as long before as the
+    next reading comes after.
+    """
+    times = [float(r.tol_s) for r in receptions]
+    for name, own in sensed.items():
+        times += [float(s.time_s[0]) for s in _sensors(own) if s is not own.odometry]
+        if own.odometry is not None:
+            t = own.odometry.time_s
+            mine = {name: reference[name]} if name in reference else {}
+            before = _before(mine, float(t[0]), strictly=True)
+            times.append(before if before is not None else float(2 * t[0] - t[1]) if len(t) > 1 else float(t[0]))
+    times += [] if times else [float(c.time_s[0]) for c in reference.values()]
     if not times:
         raise ScenarioError([Problem("mission", "nothing is recorded", "map at least one file")])
-    first = min(times)
-    before = [c.time_s[c.time_s <= first] for c in reference.values()]
-    near = [float(b[-1]) for b, c in zip(before, reference.values()) if b.size and first - b[-1] <= c.max_gap_s]
-    return min([float(first), *near])
+    before = _before(reference, min(times), strictly=False)
+    return min(times) if before is None else before
+
+
+def _before(reference: dict[str, Course], time_s: float, *, strictly: bool) -> float | None:
+    """The last instant of any reference before (or at) a time, if not longer before than the reference's gaps."""
+    found = []
+    for course in reference.values():
+        k = int(np.searchsorted(course.time_s, time_s, side="left" if strictly else "right")) - 1
+        if k >= 0 and time_s - course.time_s[k] <= course.max_gap_s:
+            found.append(float(course.time_s[k]))
+    return max(found, default=None)
 
 
 def _sensors(own: Sensed):

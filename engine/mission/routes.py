@@ -82,11 +82,12 @@ def rounded(points: np.ndarray, radius: float, *, closed: bool) -> Track:
     Where the way leads straight back the heading turns on the spot.
     """
     if closed:
-        points = np.concatenate([points, points[:2]])
+        points = np.concatenate([points, points[:1]])
+    moves = np.any(np.diff(points, axis=0) != 0, axis=1)
+    points = points[np.concatenate([[True], moves])]
+    if closed:
+        points = np.concatenate([points, points[1:2]])
     leg = np.diff(points, axis=0)
-    keep = np.linalg.norm(leg, axis=1) > 0
-    leg = leg[keep]
-    points = np.concatenate([points[:1], points[0] + np.cumsum(leg, axis=0)])
     lengths = np.linalg.norm(leg, axis=1)
     course = np.arctan2(leg[:, 1], leg[:, 0])
     turn = (np.diff(course) + np.pi) % (2 * np.pi) - np.pi

@@ -425,3 +425,20 @@ def test_plaza_1s_odometry_turns_to_the_true_heading(recorded_data):
     heading = robot.initial.heading_rad[0] + np.cumsum(robot.odometry.value[0, :, 2])
     true = np.interp(robot.odometry.time_s + truth[0, 0], truth[:, 0], np.unwrap(truth[:, 3]))
     assert np.abs(np.angle(np.exp(1j * (heading - true)))).max() < 0.05
+
+
+def test_the_clock_starts_where_the_first_increment_began(folder):
+    """At the reference before the first reading; without one, as long before it as the second comes after."""
+    only = {
+        k: v for k, v in SCENARIO["mission"].items() if k not in ("velocity", "heading", "depth", "fixes", "ranges")
+    }
+    rover = SCENARIO["vehicles"][0]
+    base = {**SCENARIO, "mission": only, "vehicles": [rover, *SCENARIO["vehicles"][2:]]}
+    (folder / "harbour" / "odometry.csv").write_text("t,ds,dth\n1,2,0.1\n1.25,2,0.1\n")
+    log = fly(toml.validate(base), [0], logs=[folder])  # type: ignore[arg-type]
+    np.testing.assert_allclose(log.vehicles[0].odometry.time_s, [1, 1.25])
+    start = {"position_m": [0, 0], "heading_deg": 0}
+    alone = {**only, "truth": []}
+    changed = toml.override(toml.validate(base), {"mission": alone, "vehicles.rover.initial": rover["initial"] | start})
+    log = fly(changed, [0], logs=[folder])  # type: ignore[arg-type]
+    np.testing.assert_allclose(log.vehicles[0].odometry.time_s, [0.25, 0.5])
