@@ -1,0 +1,73 @@
+"""May one fuse naively? One operating point, or a map of them (Rui and Chitre)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from fastapi import APIRouter
+from pydantic import BaseModel, ConfigDict, Field
+
+from engine.tracking import analysis, regions
+
+router = APIRouter(prefix="/api/tracking", tags=["tracking"])
+
+Variance = Annotated[float, Field(gt=0, le=1e9)]
+
+
+class Point(BaseModel):
+    """An operating point in one dimension; variances in m^2."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    process: Annotated[float, Field(ge=0, le=1e9)] = Field(description="variance of the target's step")
+    sensors: list[Variance] = Field(min_length=2, max_length=analysis.MOST_SENSORS, description="noise variances")
+    prior: Annotated[float, Field(ge=0, le=1e9)] = Field(description="variance of the common first estimate")
+    steps: int = Field(30, ge=1, le=analysis.MOST_STEPS)
+    trials: int = Field(2000, ge=1, le=analysis.MOST_TRIALS)
+    seed: int = Field(1, ge=0, lt=2**63)
+
+
+class Map(BaseModel):
+    """A map over the two sensors' normalized noise, logarithmic in both."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["one_step", "asymptotic"] = "asymptotic"
+    size: int = Field(100, ge=2, le=400, description="cells along each axis")
+    smallest: float = Field(0.05, ge=1e-6, le=1e6)
+    largest: float = Field(50.0, ge=1e-6, le=1e6)
+
+
+@router.post("/analysis")
+def analyse(point: Point) -> dict[str, Any]:
+    """Fig. 3's curve, Fig. 6's histories with Monte Carlo, steady states and a verdict in words, for one point."""
+    return analysis.analyse(
+        point.process, point.sensors, point.prior, steps=point.steps, trials=point.trials, seed=point.seed
+    )
+
+
+@router.post("/regions")
+def dangerous(wanted: Map) -> dict[str, Any]:
+    """Where naive fusion is worse than the better sensor alone, its boundary, and ratio maps.
+
+    axis: r of both sensors (R / (P + Q) for one step, R / Q in the steady state); maps by rows of r2 over r1;
+    boundary: r2 over the axis for r1 <= r2, null where there is none.
+    """
+    low, high = sorted((wanted.smallest, max(wanted.largest, wanted.smallest * 1.01)))
+    axis = np.geomspace(low, high, wanted.size)
+    one_step = wanted.kind == "one_step"
+    figures = (regions.one_step if one_step else regions.asymptotic)(axis[None, :], axis[:, None])
+    edge = regions.one_step_boundary(axis) if one_step else regions.asymptotic_boundary(axis)
+    return {
+        "kind": wanted.kind,
+        "axis": axis.tolist(),
+        "dangerous": figures.dangerous.astype(int).tolist(),
+        "boundary": [float(r) if np.isfinite(r) else None for r in edge],
+        "ratios": {
+            "naive_to_single": np.round(figures.naive / figures.single, 6).tolist(),
+            "central_to_distributed": np.round(figures.central / figures.distributed, 6).tolist(),
+            "naive_believed_to_actual": np.round(figures.naive_believed / figures.naive, 6).tolist(),
+        },
+        "figure_6": [{"name": "a", "r1": 1.0, "r2": 1.5}, {"name": "b", "r1": 10.0, "r2": 20.0}],
+    }

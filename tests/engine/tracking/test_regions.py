@@ -1,0 +1,96 @@
+"""The maps against the paper's inequality, the recursions, and each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from engine.tracking import analysis, recursion, regions
+from engine.tracking.model import make
+from engine.tracking.rules import RULES
+
+GRID = np.geomspace(0.05, 60, 400)
+
+
+def test_equation_18_is_the_map_on_every_cell():
+    """The printed inequality, for r1 <= r2, on a grid of 400 x 400; its boundary has no cell on it."""
+    r1, r2 = GRID[:, None], GRID[None, :]
+    low, high = np.minimum(r1, r2), np.maximum(r1, r2)
+    printed = (high > 1) & (low + high + 3 * low * high <= high**2)
+    np.testing.assert_array_equal(regions.one_step(r1, r2).dangerous, printed)
+
+
+def test_the_boundaries_divide_the_maps():
+    r1 = np.geomspace(0.1, 20, 25)
+    for boundary, figures in (
+        (regions.one_step_boundary, regions.one_step),
+        (regions.asymptotic_boundary, regions.asymptotic),
+    ):
+        edge = boundary(r1)
+        inside = edge > r1 * (1 + 1e-6)
+        assert inside.sum() > 10
+        assert not figures(r1, edge * (1 - 1e-6)).dangerous[inside].any()
+        assert figures(r1, edge * (1 + 1e-6)).dangerous.all()
+
+
+@pytest.mark.parametrize("r", [(1.0, 1.5), (10.0, 20.0), (0.2, 7.0), (5.0, 5.0)])
+def test_the_asymptotic_map_is_the_recursion_run_to_its_end(r):
+    model = make(1.0, list(r), 1.0)
+    told = regions.asymptotic(*r)
+    naive = recursion.settle(model, RULES["naive_fusion"])[0]
+    assert told.naive == pytest.approx(naive.actual_of(0)[0, 0], rel=1e-9)
+    assert told.naive_believed == pytest.approx(naive.believed[0, 0, 0], rel=1e-9)
+    optimal = recursion.settle(model, RULES["state_vector_fusion"])[0]
+    assert told.distributed == pytest.approx(optimal.actual_of(0)[0, 0], rel=1e-9)
+    alone = recursion.settle(model, None)[0]
+    assert told.single == pytest.approx(min(alone.actual_of(i)[0, 0] for i in range(2)), rel=1e-9)
+
+
+def test_the_two_operating_points_of_figure_6_lie_on_their_sides():
+    assert not regions.asymptotic(1.0, 1.5).dangerous
+    assert regions.asymptotic(10.0, 20.0).dangerous
+
+
+def test_the_central_filter_is_never_worse_than_the_distributed_one():
+    """Fig. 4, whose caption is inverted: CF / DF is at most one, everywhere."""
+    figures = regions.one_step(GRID[:, None], GRID[None, :])
+    assert np.all(figures.central <= figures.distributed * (1 + 1e-12))
+    assert np.all(figures.distributed <= figures.single * (1 + 1e-12))
+
+
+def test_round_ellipses_are_the_one_dimensional_map_twice():
+    r1, r2 = np.array([0.5, 2.0, 8.0]), np.array([3.0, 9.0, 9.0])
+    turned = regions.turned(r1, r2, elongation=1.0, angle_rad=0.7)
+    flat = regions.asymptotic(r1, r2)
+    np.testing.assert_allclose(turned.naive**2, flat.naive, rtol=1e-6)
+    np.testing.assert_array_equal(turned.dangerous, flat.dangerous)
+
+
+def test_crossed_ellipses_make_naive_fusion_safer():
+    """Sensors that see along different axes share less: the dangerous region shrinks as they turn apart."""
+    r = np.geomspace(0.2, 20, 12)
+    shares = [
+        regions.turned(r[:, None], r[None], elongation=3.0, angle_rad=a).dangerous.mean() for a in (0.0, np.pi / 2)
+    ]
+    assert shares[1] < shares[0]
+    with pytest.raises(ValueError, match="elongation"):
+        regions.turned(r, r, elongation=0.5, angle_rad=0.0)
+
+
+def test_an_operating_point_is_analysed_from_every_side():
+    told = analysis.analyse(1.0, [10.0, 20.0], 10.0, steps=40, trials=4000)
+    assert "worse than one sensor alone here, after 3 steps" in told["verdict"]
+    assert told["weights"]["optimal_weight"] == pytest.approx(1 / 3)
+    assert min(told["weights"]["distributed"]) == pytest.approx(told["weights"]["optimal"], rel=1e-3)
+    assert told["steady"]["naive_fusion"]["actual"] == pytest.approx(3.9123, rel=1e-6)
+    for history in told["histories"].values():
+        inside = [low <= a <= high for (low, high), a in zip(history["monte_carlo_interval"], history["actual"])]
+        assert np.mean(inside) > 0.8
+    safe = analysis.analyse(10.0, [10.0, 15.0], 10.0, trials=10)
+    assert safe["verdict"].startswith("You may")
+
+
+@pytest.mark.parametrize("wrong", [{"steps": 0}, {"steps": 10**6}, {"trials": 0}, {"sensors": [1.0] * 99}])
+def test_an_analysis_is_bounded_in_size(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        analysis.analyse(**{"process": 1.0, "sensors": [1.0, 2.0], "prior": 1.0, **wrong})
