@@ -12,6 +12,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import NoReturn
 
@@ -59,8 +60,7 @@ def read_pyfg(scenario: NavigationScenario, folder: Path) -> Recording:
     sensed, reference = {}, {}
     for letter, name in mission.robots.items():
         sensed[name] = Sensed(odometry=_odometry(scenario, graph, letter, name))
-        keys = sorted((k for k in graph.poses if k[0] == letter), key=lambda k: graph.poses[k][0])
-        poses = np.array([graph.poses[k] for k in keys])
+        poses = np.array([graph.poses[k] for k in _in_time(graph, letter)])
         if mission.reference != "none":
             reference[name] = Course(poses[:, 0], poses[:, 1:3], poses[:, 3], mission.max_gap_s)
     nodes = {name: _point(graph, key, mission) for key, name in mission.nodes.items()}
@@ -165,25 +165,37 @@ def _point(graph: Graph, key: str, mission: PyfgRecording) -> np.ndarray:
 # --- readings ------------------------------------------------------------------------------------------------------
 
 
+def _in_time(graph: Graph, letter: str) -> list[str]:
+    """The keys of a robot's poses in order of time."""
+    return sorted((k for k in graph.poses if k[0] == letter), key=lambda k: graph.poses[k][0])
+
+
 def _odometry(scenario: NavigationScenario, graph: Graph, letter: str, name: str) -> Odometry | None:
-    """A robot's increments in order; noise as its scenario states it, else the file's covariances, scaled."""
+    """A robot's increments from pose to pose; noise as its scenario states it, else the file's covariances, scaled.
+
+    Relative poses between any others (loop closures) are no odometry and not used.
+    """
     mission = scenario.mission
     assert isinstance(mission, PyfgRecording)
-    edges = [e for e in graph.odometry if e[0][0] == letter and e[1][0] == letter]
-    for start, end, *_ in edges:
-        for key in (start, end):
+    between = {e[:2]: e for e in graph.odometry if e[0][0] == letter}
+    for pair in between:
+        for key in pair:
             if key not in graph.poses:
-                _fail("mission.file", f"{mission.file}: odometry from {start} to {end} lacks pose {key}", "add it")
-    edges.sort(key=lambda e: graph.poses[e[1]][0])
+                _fail(
+                    "mission.file", f"{mission.file}: odometry from {pair[0]} to {pair[1]} lacks pose {key}", "add it"
+                )
+    keys = _in_time(graph, letter)
+    edges = []
+    for start, end in pairwise(keys):
+        if (start, end) not in between:
+            _fail("mission.file", f"{mission.file}: there is no odometry from {start} to the next pose {end}", "add it")
+        edges.append(between[start, end])
     if not edges:
         return None
-    begin = np.array([graph.poses[e[0]][0] for e in edges])
-    time_s = np.array([graph.poses[e[1]][0] for e in edges])
-    if np.any(time_s <= begin) or np.any(begin[1:] < time_s[:-1] - 1e-9):
-        k = int(np.argmax((time_s <= begin) | np.concatenate([[False], begin[1:] < time_s[:-1] - 1e-9])))
-        _fail(
-            "mission.file", f"{mission.file}: odometry from {edges[k][0]} to {edges[k][1]} goes back in time", "drop it"
-        )
+    begin, time_s = (np.array([graph.poses[k][0] for k in ks]) for ks in (keys[:-1], keys[1:]))
+    if np.any(time_s <= begin):
+        k = int(np.argmax(time_s <= begin))
+        _fail("mission.file", f"{mission.file}: poses {keys[k]} and {keys[k + 1]} are at the same time", "drop one")
     value = np.stack([e[2] for e in edges])
     vehicle = next(v for v in scenario.vehicles if v.name == name)
     if vehicle.sensors.odometry is not None:

@@ -122,7 +122,8 @@ def test_a_reference_that_is_no_truth_is_labelled_or_left_out(folder):
         ("EDGE_RANGE 0 A1 L1", "EDGE_RANGE 0 A9 L1", "A9, which is no pose"),
         ("EDGE_RANGE 0 A1 L1", "EDGE_RANGE 0 A1 L7", "L7, which is no vehicle's"),
         ("VERTEX_SE2 101 A1", "VERTEX_SE2 101 A0", "line 2: pose A0 again"),
-        ("VERTEX_SE2 101 A1", "VERTEX_SE2 104 A1", "goes back in time"),
+        ("VERTEX_SE2 101 A1", "VERTEX_SE2 104 A1", "no odometry from A0 to the next pose A2"),
+        ("VERTEX_SE2 101 A1", "VERTEX_SE2 100 A1", "poses A0 and A1 are at the same time"),
         ("VERTEX_SE2 103 B1", "VERTEX_SE2 103 C1", "mission.robots"),
         ("EDGE_SE2 0 A1 A2", "EDGE_SE2 0 A1 A5", "lacks pose A5"),
     ],
@@ -131,6 +132,11 @@ def test_a_bad_line_is_named(folder, old, new, words):
     (folder / "graph" / "graph.pyfg").write_text(TEXT.replace(old, new))
     with pytest.raises(ScenarioError, match=words):
         read(folder)
+
+
+def test_a_loop_closure_is_no_odometry(folder):
+    (folder / "graph" / "graph.pyfg").write_text(TEXT + "EDGE_SE2 0 A0 A2 9 9 9 1 0 0 1 0 1\n")
+    np.testing.assert_array_equal(read(folder).vehicles[0].odometry.value, [[[1, 0.1, 0.1], [2, 0.2, 0.1]]])
 
 
 def test_a_range_that_stands_twice_is_used_once(folder):
