@@ -10,11 +10,12 @@ import { mountNotices } from "./notices.js";
 import { mountRuns } from "./runs/runs.js";
 import { clock } from "./state/clock.js";
 import { suspect } from "./state/connection.js";
-import { readLibrary } from "./state/library.js";
+import { pickAgain, readLibrary } from "./state/library.js";
 import { readLink, writeLink } from "./state/link.js";
 import { closeRun, openRun } from "./state/run.js";
 import { store } from "./state/store.js";
 import { mountTabs } from "./tabs.js";
+import { mountExplorer } from "./tracking/explorer.js";
 import { SceneSession } from "./wire/scenes.js";
 import { mountClaims } from "./workbench/claims.js";
 import { mountHeadline } from "./workbench/headline.js";
@@ -33,6 +34,7 @@ mountMissions();
 mountAlgorithms();
 mountLaunch();
 mountPreview();
+mountExplorer();
 mountHeadline();
 
 const panes = mountPanes(listenKeys);
@@ -57,6 +59,12 @@ store.watch(["job"], ({ job }) => {
   shown = job?.id ?? null;
   if (job) session.show(job.id, job.algorithms.slice(0, MOST_PANES));
 });
+let picked = null;
+store.watch(["job", "missions"], ({ job, missions }) => {
+  if (!job || missions === null || job.id === picked) return;
+  picked = job.id;
+  pickAgain(job);
+});
 clock.watch(() => {
   if (shown !== null && clock.end > clock.start && !clock.following) session.seek(clock.time);
 });
@@ -79,7 +87,6 @@ function followLink() {
   else if (run && time_s !== null) clock.seek(time_s);
 }
 window.addEventListener("hashchange", followLink);
-window.addEventListener("popstate", followLink);
 followLink();
 store.watch(["run", "vehicle", "view"], write);
 

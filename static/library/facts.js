@@ -1,14 +1,28 @@
 // A scenario in a few words and figures.
 
-import { duration, number, percent, plural } from "../look/format.js";
+import { duration, percent, plural, written } from "../look/format.js";
 
+/** Models of packet loss by kind: in words, and in one or two. */
 const LOSSES = {
-  fixed: (loss) => percent(loss.rate),
-  range: (loss) => `grows with range, half at ${number(loss.half_range_m)} m`,
+  fixed: (loss) => {
+    const rates = (loss.links ?? []).map((link) => link.rate);
+    return rates.length ? `${percent(Math.min(...rates))} to ${percent(Math.max(...rates))}, by link` : percent(loss.rate);
+  },
+  range: (loss) => `grows with range, half at ${written(loss.half_range_m)} m`,
   snr: () => "by signal-to-noise ratio",
-  bursty: (loss) => `in bursts of ${number(loss.mean_bad_s)} s`,
+  bursty: (loss) => `in bursts of ${written(loss.mean_bad_s)} s`,
   recorded: () => "as recorded",
 };
+
+const SHORT = { range: "by range", snr: "by SNR", bursty: "in bursts", recorded: "recorded" };
+
+/** The packet loss of a network as short as a field allows. */
+export function lossShort(network) {
+  const loss = network?.loss ?? 0;
+  if (typeof loss === "number") return String(loss);
+  if (loss.kind === "fixed") return loss.links?.length ? "by link" : String(loss.rate);
+  return SHORT[loss.kind] ?? loss.kind;
+}
 
 /** The packet loss of a network in words. */
 export function lossWords(network) {
@@ -32,7 +46,7 @@ export function facts(scenario) {
   const { network } = scenario;
   if (network?.tdma) {
     const { slots, cycle_s } = network.tdma;
-    found.push(["Broadcasts", `${slots.length} every ${number(cycle_s)} s`]);
+    found.push(["Broadcasts", `${slots.length} every ${written(cycle_s)} s`]);
   }
   if (network) found.push(["Packet loss", lossWords(network)]);
   found.push(["Trials", String(scenario.trials ?? 1)]);

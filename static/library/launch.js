@@ -3,6 +3,7 @@
 import { el, part } from "../look/dom.js";
 import { atWork, cancelRun, startRun } from "../state/run.js";
 import { store } from "../state/store.js";
+import { lossShort } from "./facts.js";
 
 /** Fields by the key the server knows them under. */
 const FIELDS = {
@@ -60,8 +61,7 @@ export function mountLaunch() {
   });
   store.watch(["scenario"], ({ scenario }) => {
     inputs.seed.placeholder = scenario?.seed === undefined ? "" : String(scenario.seed);
-    const loss = scenario?.network?.loss ?? 0;
-    inputs["network.loss"].placeholder = typeof loss === "number" ? String(loss) : loss.kind;
+    inputs["network.loss"].placeholder = scenario?.network ? lossShort(scenario.network) : "";
     inputs["network.loss"].closest("label").hidden = scenario !== null && !scenario.network;
   });
   store.watch(["ticked", "mission", "missions"], ready);

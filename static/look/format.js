@@ -11,6 +11,11 @@ export function number(value, digits = 3) {
   return value.toFixed(Math.min(decimals, 4));
 }
 
+/** A number somebody wrote down, as they would have: 30, 0.2, 145. */
+export function written(value) {
+  return String(Number(value.toPrecision(4)));
+}
+
 /** A whole number with thin spaces between thousands. */
 export function count(value) {
   if (value === null || value === undefined) return NONE;
@@ -35,7 +40,7 @@ export function clockTime(seconds, fine = false) {
 /** How long something lasts: 45 s, 12 min, 2 h, 1 h 30 min. */
 export function duration(seconds) {
   if (!Number.isFinite(seconds)) return NONE;
-  if (seconds < 90) return `${number(seconds)} s`;
+  if (seconds < 90) return `${written(seconds)} s`;
   const minutes = Math.round(seconds / 60);
   if (minutes < 60) return `${minutes} min`;
   const rest = minutes % 60;

@@ -43,6 +43,14 @@ export function pickMission(name, ticked = null) {
   });
 }
 
+/** Picks what a run that is opened was made of, so that it can be varied. */
+export function pickAgain(job) {
+  const { missions, mission, ticked } = store.state;
+  const known = missions?.some((m) => m.name === job.scenario && m.available);
+  const same = mission === job.scenario && job.algorithms.join() === ticked.join();
+  if (known && !same) pickMission(job.scenario, job.algorithms);
+}
+
 /** Algorithms that can run a mission, in the registry's order. */
 export function fittingAlgorithms(entry) {
   const all = store.state.algorithms ?? [];

@@ -57,6 +57,8 @@ export const view = (id, signal) => request(`${job(id)}/view`, { signal });
 export const result = (id, signal) => request(`${job(id)}/result`, { signal });
 export const cancel = (id) => request(`${job(id)}/cancel`, { method: "POST" });
 export const remove = (id) => request(job(id), { method: "DELETE" });
+export const analyseTracking = (body, signal) => request("/api/tracking/analysis", { method: "POST", body, signal });
+export const trackingRegions = (body) => request("/api/tracking/regions", { method: "POST", body });
 export const eventsPath = (id) => `${job(id)}/events`;
 
 /** Submits a job; the key makes a repeated submission the same job. */

@@ -68,13 +68,9 @@ function build(quantity) {
   const probe = el("div", { class: "cursor probe", "aria-hidden": "true", hidden: true }, el("span"));
   const empty = el("p", { class: "quiet" });
   const canvas = el("div", { class: "canvas" }, drawing, cursor, probe, empty);
-  const root = el(
-    "figure",
-    { class: "plot", "data-quantity": quantity.key },
-    el("figcaption", {}, el("span", { class: "name" }, quantity.title), whose, legend),
-    canvas,
-  );
-  const plot = { quantity, root, whose, legend, drawing, cursor, probe, canvas, empty, curves: new Map(), values: new Map(), scale: 1 };
+  const caption = el("figcaption", {}, el("span", { class: "name" }, quantity.title), whose, legend);
+  const root = el("figure", { class: "plot", "data-quantity": quantity.key }, caption, canvas);
+  const plot = { quantity, root, caption, whose, legend, drawing, cursor, probe, canvas, empty, curves: new Map(), values: new Map(), scale: 1 };
   const timeAt = (event) => {
     const box = canvas.getBoundingClientRect();
     const share = (event.clientX - box.left - MARGIN.l) / (box.width - MARGIN.l - MARGIN.r);
@@ -98,14 +94,22 @@ function build(quantity) {
   return plot;
 }
 
+const NOTHING = {
+  queued: "Waiting for the first trials…",
+  running: "Waiting for the first trials…",
+  done: "There is no reference to compare with.",
+  failed: "The run failed before there was a curve.",
+  cancelled: "The run was cancelled before there was a curve.",
+};
+
 async function show(plot, logarithmic) {
   const { state } = store;
   const { quantity, legend, empty } = plot;
   plot.curves = curvesOf(quantity, state);
   say(plot.whose, state.vehicle ? ` of ${state.vehicle}` : "");
-  plot.root.title = quantity.how(state.view ? (state.job?.trials ?? 1) : 1);
+  plot.caption.title = quantity.how(state.view ? (state.job?.trials ?? 1) : 1);
   empty.hidden = plot.curves.size > 0;
-  empty.textContent = state.job?.state === "done" ? "There is no reference to compare with." : state.job ? "Waiting for the first trials…" : "";
+  empty.textContent = NOTHING[state.job?.state] ?? "";
   plot.values = new Map();
   legend.replaceChildren(
     ...[...plot.curves.keys()].map((name) => {

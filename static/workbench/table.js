@@ -42,7 +42,7 @@ export function mountTable() {
       result
         ? el("div", { class: "scroll-x", tabindex: 0, role: "region", "aria-label": "Comparison table" }, table(result, algorithms ?? [], view))
         : el("p", { class: "quiet" }, WAITING[job.state] ?? "Reading the result…"),
-      ...notes(job),
+      ...notes(result, algorithms ?? []),
     );
     choose(store.state);
   };
@@ -102,7 +102,10 @@ function isBest(head, metrics, subject, result, algorithms) {
   return errors.length > 1 && contenders.some(([, a]) => a.subjects[subject] === metrics) && metrics.rmse_m === Math.min(...errors);
 }
 
-function notes(job) {
-  if (!job.notes?.length) return [];
-  return [el("ul", { class: "remarks", "aria-label": "Remarks" }, job.notes.map((text) => el("li", {}, text)))];
+/** What the estimators themselves remark: assumptions not met, ranges refused. */
+function notes(result, algorithms) {
+  const remarks = Object.entries(result?.algorithms ?? {}).flatMap(([name, { notes }]) =>
+    notes.map((text) => el("li", {}, el("b", {}, algorithms.find((a) => a.name === name)?.title ?? name), ` ${text}`)),
+  );
+  return remarks.length ? [el("ul", { class: "remarks", "aria-label": "Remarks of the estimators" }, remarks)] : [];
 }

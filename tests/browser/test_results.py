@@ -75,6 +75,8 @@ def test_runs_are_kept_reopened_and_deleted(page: Page, server: Server, solo: st
     page.locator(f"[data-run='{solo}'] .open").click()
     expect(page).to_have_url(re.compile(f"run={solo}"))
     expect(page.locator("#headline")).to_contain_text("seed 7")
+    expect(page.locator("input[value=cekf]")).to_be_checked()
+    expect(page.locator("input[value=nekf]")).not_to_be_checked()
     page.go_back()
     expect(page.locator("#headline")).to_contain_text("seed 5")
     page.go_forward()
