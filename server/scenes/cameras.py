@@ -44,7 +44,6 @@ class Cameras:
 
         @pane.server.on_client_connect
         def connected(client: viser.ClientHandle) -> None:
-            _turn(client, self.pose)
             deadline, settled = time.monotonic() + SETTLE_S, False
 
             @client.camera.on_update
@@ -54,6 +53,8 @@ class Cameras:
                 if settled:
                     self._loop.call_soon_threadsafe(self._lead, pane, pose)
                 settled = settled or np.allclose(pose, self.pose, atol=SAME) or time.monotonic() > deadline
+
+            _turn(client, self.pose)
 
     def leave(self, pane: Pane) -> None:
         self._panes.remove(pane)

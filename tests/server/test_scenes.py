@@ -149,20 +149,23 @@ def camera(position: tuple[float, float, float]) -> bytes:
 
 
 def test_the_other_panes_follow_the_camera_of_one(live: Live, job: str):
+    start, place = OBLIQUE[:3].tolist(), [4.0, 5.0, 6.0]
     with session(live) as mine:
         panes = mine.show(job, "cekf", "nekf")
         servers = [live.app.state.site.scenes.panes[p.split("/")[2]].server for p in panes.values()]
         with viewer(live, panes["cekf"]) as one, viewer(live, panes["nekf"]) as other:
+            clients = []
             for socket, server in ((one, servers[0]), (other, servers[1])):
                 socket.send(camera(position=(3.0, 3.0, 3.0)))
-                until(lambda server=server: server.get_clients(), "the viewer")
-                socket.send(camera(position=(3.0, 3.0, 3.1)))
-                socket.send(camera(position=tuple(OBLIQUE[:3].tolist())))
-            (leader,), (follower,) = (server.get_clients().values() for server in servers)
-            for client in (leader, follower):
-                until(lambda client=client: tuple(client.camera.position) == tuple(OBLIQUE[:3]), "the common start")
-            one.send(camera(position=(4.0, 5.0, 6.0)))
-            until(lambda: tuple(follower.camera.position) == (4.0, 5.0, 6.0), "the other pane's camera")
+                clients += until(lambda server=server: list(server.get_clients().values()), "the viewer")
+            for client in clients:
+                until(lambda client=client: client.camera.position.tolist() == start, "the common start")
+
+            def dragged() -> bool:
+                one.send(camera(position=tuple(place)))
+                return clients[1].camera.position.tolist() == place
+
+            until(dragged, "the other pane's camera")
 
 
 def test_panes_close_with_their_session(live: Live, job: str):
