@@ -242,7 +242,7 @@ class _Recorder:
             packets=packets,
             innovations=innovations,
             series=series,
-            notes=tuple(notes),
+            notes=(*self.mission.log.notes, *notes),
             cpu_s=time.process_time() - self.started,
         )
 

@@ -13,8 +13,8 @@ export function mountPreview() {
     if (missions === null) stage.replaceChildren(el("p", { class: "quiet" }, "Reading the library…"));
     else if (!entry) stage.replaceChildren(el("p", { class: "quiet" }, "No mission in the library can run here."));
     else {
-      stage.replaceChildren(
-        el("div", { class: "chart" }, sketch(scenario, 520, 300)),
+      const shown = [
+        scenario?.family === "tracking" ? null : el("div", { class: "chart" }, sketch(scenario, 520, 300)),
         el("h1", {}, entry.title),
         el("p", { class: "lead" }, entry.summary),
         entry.source ? el("p", { class: "source" }, entry.source) : null,
@@ -22,7 +22,8 @@ export function mountPreview() {
           ? el("dl", { class: "facts" }, facts(scenario).map(([name, value]) => el("div", {}, el("dt", {}, name), el("dd", {}, value))))
           : null,
         el("p", { class: "how" }, "Tick the estimators to compare and press ", el("b", {}, "Run"), "."),
-      );
+      ];
+      stage.replaceChildren(...shown.filter((node) => node !== null));
     }
   });
 }
