@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +77,7 @@ def outline(mission: TrackingMission) -> Outline:
 def run(mission: TrackingMission, progress: Progress, rule: Rule | None) -> Tracks:
     """One fuser over a block of trials."""
     answer = simulate.estimate(mission.model, mission.draws, rule, mission.heard)
-    progress(1.0, None)
+    progress(1.0, _first_trial(mission, answer))
     trials, steps = mission.draws.z[0].shape[:2]
     N = len(mission.names)
     if rule is None:
@@ -92,13 +93,26 @@ def run(mission: TrackingMission, progress: Progress, rule: Rule | None) -> Trac
 def run_centrally(mission: TrackingMission, progress: Progress) -> Tracks:
     """The central filter over a block of trials."""
     answer = simulate.estimate_centrally(mission.model, mission.draws)
-    progress(1.0, None)
+    progress(1.0, _first_trial(mission, answer))
     return _tracks(mission, answer, PacketCount())
 
 
 def by(rule: Rule | None) -> Callable[[TrackingMission, Progress], Tracks]:
     """An algorithm's run function for a fusion rule; None: nobody cooperates."""
     return lambda mission, progress: run(mission, progress, rule)
+
+
+def _first_trial(mission: TrackingMission, answer: Estimates) -> dict[str, Any]:
+    """The first trial's estimates for whoever watches."""
+    cov = answer.believed[0]
+    return {
+        "time_s": mission.time_s.tolist(),
+        "mean": {s: answer.mean[0, :, i].tolist() for i, s in enumerate(mission.subjects)},
+        "cov": {
+            s: np.stack([cov[:, i, 0, 0], cov[:, i, 0, 1], cov[:, i, 1, 1]], -1).tolist()
+            for i, s in enumerate(mission.subjects)
+        },
+    }
 
 
 def _tracks(mission: TrackingMission, answer: Estimates, packets: PacketCount) -> Tracks:
