@@ -14,6 +14,7 @@ import { pickAgain, readLibrary } from "./state/library.js";
 import { readLink, writeLink } from "./state/link.js";
 import { closeRun, openRun } from "./state/run.js";
 import { store } from "./state/store.js";
+import { mountStudies } from "./studies/studies.js";
 import { mountTabs } from "./tabs.js";
 import { mountExplorer } from "./tracking/explorer.js";
 import { SceneSession } from "./wire/scenes.js";
@@ -35,6 +36,7 @@ mountAlgorithms();
 mountLaunch();
 mountPreview();
 mountExplorer();
+mountStudies();
 mountHeadline();
 
 const panes = mountPanes(listenKeys);

@@ -59,6 +59,8 @@ export const cancel = (id) => request(`${job(id)}/cancel`, { method: "POST" });
 export const remove = (id) => request(job(id), { method: "DELETE" });
 export const analyseTracking = (body, signal) => request("/api/tracking/analysis", { method: "POST", body, signal });
 export const trackingRegions = (body) => request("/api/tracking/regions", { method: "POST", body });
+export const tablePlan = () => request("/api/tables/walls2011-table-1");
+export const tableOf = (runs) => request("/api/tables/walls2011-table-1", { method: "POST", body: runs });
 export const eventsPath = (id) => `${job(id)}/events`;
 
 /** Submits a job; the key makes a repeated submission the same job. */

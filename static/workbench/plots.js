@@ -3,6 +3,7 @@
 import { el, part, say } from "../look/dom.js";
 import { clockTime, metres } from "../look/format.js";
 import { darkScheme, lineStyle } from "../look/palette.js";
+import { loadPlotly } from "../look/plotly.js";
 import { lineSample } from "../look/swatch.js";
 import { clock } from "../state/clock.js";
 import { store } from "../state/store.js";
@@ -12,25 +13,9 @@ const MARGIN = { l: 52, r: 14, t: 6, b: 36 };
 /** While estimates stream in, curves are drawn at most this often. */
 const REDRAW_MS = 400;
 
-let plotly = null;
 /** Mission time under the pointer in any of the plots, or null; the curves' values are read there. */
 let hovered = null;
 let hover = () => {};
-
-/** plotly, fetched when the first curve is to be drawn. */
-function loadPlotly() {
-  plotly ??= new Promise((resolve, reject) => {
-    const script = el("script", { src: "/vendor/plotly.min.js" });
-    script.addEventListener("load", () => resolve(window.Plotly));
-    script.addEventListener("error", () => {
-      plotly = null;
-      script.remove();
-      reject(new Error("The plots could not be loaded."));
-    });
-    document.head.append(script);
-  });
-  return plotly;
-}
 
 export function mountPlots() {
   const logarithmic = el("input", { type: "checkbox", id: "log" });
