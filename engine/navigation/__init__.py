@@ -9,6 +9,8 @@ from engine.navigation.mission import fly_navigation, outline
 from engine.navigation.nekf import NEKF
 from engine.registry import Family
 
-NAVIGATION = Family(name="navigation", title="Cooperative navigation", fly=fly_navigation, outline=outline)
+NAVIGATION = Family(
+    name="navigation", title="Cooperative navigation", fly=fly_navigation, outline=outline, accepts=("smoothing",)
+)
 
 REGISTERED = (NAVIGATION, DEAD_RECKONING, CEKF, NEKF, INTERLEAVED_UPDATE, DEIF, MDEIF)

@@ -15,7 +15,7 @@ from scipy.linalg import get_blas_funcs, get_lapack_funcs, solve_triangular
 from engine.gaussian.forms import transpose
 
 dpbtrf, dpbtrs, dpotrf = get_lapack_funcs(("pbtrf", "pbtrs", "potrf"), dtype=np.float64)
-dsbmv = get_blas_funcs("sbmv", dtype=np.float64)
+(dsbmv,) = get_blas_funcs(("sbmv",), dtype=np.float64)
 
 #: Narrower bands are still worked on in blocks of this size, against call overhead.
 SMALLEST_BLOCK = 12

@@ -24,7 +24,11 @@ from engine.smoothing.graph import Graph
 MAX_STEPS = 100
 #: A step shorter than this (m, rad, m/s) ends the iteration, unless asked otherwise.
 SETTLED = 1e-6
+#: So is one that promises to lower the cost by less than this.
+NOTHING_LEFT = 1e-12
 _DAMPING_STEPS = 12
+#: How often ranges are judged anew, and the rest solved again.
+MAX_JUDGEMENTS = 10
 
 
 @dataclass(frozen=True)
@@ -81,19 +85,38 @@ class _Problem:
 
 
 def smooth(
-    graph: Graph, start: np.ndarray | None = None, *, gate_sigma: float | None = None, settled: float = SETTLED
+    graph: Graph,
+    start: np.ndarray | None = None,
+    *,
+    weights: list[np.ndarray] | None = None,
+    gate_sigma: float | None = None,
+    settled: float = SETTLED,
 ) -> Solution:
     """The most likely unknowns of a graph, from `start` or its reference.
 
-    With gate_sigma ranges whose residual is larger than that many standard deviations count as gross. Raises
-    NotPositiveDefinite where the factors leave something undetermined.
+    With gate_sigma ranges whose residual is larger than that many standard deviations count as gross. Where somebody
+    already judged them, `weights` says so (per group of ranges, 1 or 0) and the solution starts from there; else it
+    starts from all of them, made gradually less convex. Raises NotPositiveDefinite where the factors leave something
+    undetermined.
     """
     problem = _Problem(graph)
     x = graph.reference.copy() if start is None else start.copy()
-    weights = [np.ones(len(r.value)) for r in graph.ranges]
-    if gate_sigma is not None and graph.ranges:
-        x, weights = _graduate(problem, x, weights, gate_sigma)
-    return _descend(problem, x, weights, settled=settled)
+    if gate_sigma is None or not graph.ranges:
+        return _descend(problem, x, [np.ones(len(r.value)) for r in graph.ranges], settled=settled)
+    if weights is None:
+        x, weights = _graduate(problem, x, [np.ones(len(r.value)) for r in graph.ranges], gate_sigma)
+    solution = _descend(problem, x, weights, settled=settled)
+    for _ in range(MAX_JUDGEMENTS):
+        x, judged = solution.x, [_inlying(r.normalized(solution.x), gate_sigma) for r in graph.ranges]
+        if all(np.array_equal(w, j) for w, j in zip(weights, judged)):
+            break
+        weights = judged
+        solution = _descend(problem, x, weights, settled=settled)
+    return solution
+
+
+def _inlying(normalized: np.ndarray, gate_sigma: float) -> np.ndarray:
+    return (np.abs(normalized) <= gate_sigma).astype(float)
 
 
 def _descend(
@@ -112,6 +135,7 @@ def _descend(
         steps += 1
         step = solve(factor, system)
         longest = np.abs(step).max(initial=0.0)
+        promised = 0.5 * float(step @ system.rhs)
         tried = problem.cost(x + step, weights)
         damping = 1e-4
         for _ in range(_DAMPING_STEPS):
@@ -125,7 +149,7 @@ def _descend(
             status = "stuck"
             break
         x, cost = x + step, tried
-        if longest < settled:
+        if longest < settled or promised < NOTHING_LEFT:
             status = "converged"
             break
         system = problem.linearize(x, weights)
@@ -144,7 +168,7 @@ def _graduate(
         weights = [_truncated_weight(r.normalized(x) ** 2, c2, mu) for r in graph.ranges]
         x = _descend(problem, x, weights, max_steps=2).x
         mu *= 1.6
-    return x, [(r.normalized(x) ** 2 <= c2).astype(float) for r in graph.ranges]
+    return x, [_inlying(r.normalized(x), gate_sigma) for r in graph.ranges]
 
 
 def _truncated_weight(square: np.ndarray, c2: float, mu: float) -> np.ndarray:
