@@ -1,7 +1,7 @@
 // Curves over mission time; cursors are overlays, so that moving them draws nothing anew.
 
 import { el, part, say } from "../look/dom.js";
-import { clockTime, metres } from "../look/format.js";
+import { clockTime } from "../look/format.js";
 import { darkScheme, lineStyle } from "../look/palette.js";
 import { loadPlotly } from "../look/plotly.js";
 import { lineSample } from "../look/swatch.js";
@@ -93,6 +93,7 @@ async function show(plot, logarithmic) {
   plot.curves = curvesOf(quantity, state);
   say(plot.whose, state.vehicle ? ` of ${state.vehicle}` : "");
   plot.caption.title = quantity.how(state.view ? (state.job?.trials ?? 1) : 1);
+  plot.root.hidden = Boolean(quantity.extra) && plot.curves.size === 0;
   empty.hidden = plot.curves.size > 0;
   empty.textContent = NOTHING[state.job?.state] ?? "";
   plot.values = new Map();
@@ -181,5 +182,5 @@ function point(plot) {
   put(plot.cursor, clock.time);
   put(plot.probe, hovered);
   if (hovered !== null) say(plot.probe.firstChild, clockTime(hovered));
-  for (const [name, value] of plot.values) say(value, metres(valueAt(plot.curves.get(name), hovered ?? clock.time)));
+  for (const [name, value] of plot.values) say(value, plot.quantity.format(valueAt(plot.curves.get(name), hovered ?? clock.time)));
 }
