@@ -24,8 +24,8 @@ from engine.smoothing.graph import Graph
 MAX_STEPS = 100
 #: A step shorter than this (m, rad, m/s) ends the iteration, unless asked otherwise.
 SETTLED = 1e-6
-#: So is one that promises to lower the cost by less than this.
-NOTHING_LEFT = 1e-12
+#: Where no step goes downhill any more although less than this part of the cost was to be gained, it is round-off.
+NOTHING_LEFT = 1e-9
 _DAMPING_STEPS = 12
 #: How often ranges are judged anew, and the rest solved again.
 MAX_JUDGEMENTS = 10
@@ -146,10 +146,10 @@ def _descend(
             tried = problem.cost(x + step, weights)
             damping *= 10.0
         else:
-            status = "stuck"
+            status = "converged" if promised < NOTHING_LEFT * (1 + abs(cost)) else "stuck"
             break
         x, cost = x + step, tried
-        if longest < settled or promised < NOTHING_LEFT:
+        if longest < settled:
             status = "converged"
             break
         system = problem.linearize(x, weights)
