@@ -46,7 +46,7 @@ REGISTERED = (
         "Weighted sum of the estimates, the one weight chosen for the smallest error volume.",
         "Rui and Chitre, eq. 6-8",
         by(distributed_fusion),
-        assumes=("cross-covariances are tracked",),
+        assumes=("every node knows the others' models and who heard whom, to track the cross-covariances",),
     ),
     _fuser(
         "state_vector_fusion",
@@ -54,7 +54,7 @@ REGISTERED = (
         "Maximum likelihood from the estimates with their tracked cross-covariance.",
         "Bar-Shalom and Campo 1986; Rui and Chitre, eq. 9",
         by(state_vector_fusion),
-        assumes=("cross-covariances are tracked",),
+        assumes=("every node knows the others' models and who heard whom, to track the cross-covariances",),
     ),
     _fuser(
         "covariance_intersection",

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 from engine.tracking import recursion, simulate
 from engine.tracking.model import Model, make
 from engine.tracking.rules import RULES
+from engine.tracking.steady import settle, settle_centrally
 
 MOST_STEPS, MOST_TRIALS, MOST_SENSORS = 500, 20_000, 8
 WEIGHTS = 101
@@ -41,12 +42,13 @@ def analyse(
     best = int(np.argmin(sensors))
     histories = {"single_sensor": _history(model, draws, None, best), "centralized_fusion": _central(model, draws)}
     histories |= {name: _history(model, draws, rule, 0) for name, rule in RULES.items()}
+    steady = _steady(model, best)
     return {
         "operating_point": {"process": process, "sensors": list(sensors), "prior": prior},
         "weights": _weights(model),
         "histories": histories,
-        "steady": _steady(model, best),
-        "verdict": verdict(model, best),
+        "steady": steady,
+        "verdict": verdict(model, best, steady),
     }
 
 
@@ -96,40 +98,45 @@ def _weights(model: Model) -> dict[str, Any]:
         "optimal": float(optimal.actual_of(0)[0, 0]),
         "single": min(P11, P22),
         "central": float(recursion.central(two, model.prior)[0, 0]),
-        "naive_weight": P11 / (P11 + P22),
+        "naive_weight": P11 / (P11 + P22) if P11 + P22 > 0 else 0.5,
         "naive": float(naive.actual_of(0)[0, 0]),
         "naive_believed": float(naive.believed[0, 0, 0]),
     }
 
 
 def _steady(model: Model, best: int) -> dict[str, Any]:
+    """Believed and actual variance of every fuser after infinitely many steps; None where it has no such state."""
     steady: dict[str, Any] = {}
     for name, rule in [("single_sensor", None), *RULES.items()]:
-        nodes, settled = recursion.settle(model, rule)
+        nodes, settled = settle(model, rule)
         node = best if rule is None else 0
-        figures = (float(nodes.believed[node, 0, 0]), float(nodes.actual_of(node)[0, 0]))
-        steady[name] = {"believed": figures[0], "actual": figures[1]} if settled.all() else None
-    P = model.prior
-    for _ in range(MOST_STEPS * 40):
-        after = recursion.central(model, P)
-        if np.abs(after - P).max() < 1e-14 * after.max():
-            break
-        P = after
-    steady["centralized_fusion"] = {"believed": float(P[0, 0]), "actual": float(P[0, 0])}
+        figures = {"believed": float(nodes.believed[node, 0, 0]), "actual": float(nodes.actual_of(node)[0, 0])}
+        steady[name] = figures if settled else None
+    central, settled = settle_centrally(model)
+    steady["centralized_fusion"] = (
+        {"believed": float(central[0, 0]), "actual": float(central[0, 0])} if settled else None
+    )
     return steady
 
 
-def verdict(model: Model, best: int, steps: int = 200) -> str:
+def verdict(model: Model, best: int, steady: dict[str, Any], steps: int = 200) -> str:
     """Whether one may fuse naively here, in a sentence, from the closed form."""
-    naive = [s.actual_of(0)[0, 0] for s in recursion.history(model, RULES["naive_fusion"], steps)]
-    alone = [s.actual_of(best)[0, 0] for s in recursion.history(model, None, steps)]
-    worse = np.array(naive) > np.array(alone) * (1 + 1e-12)
-    believed = recursion.settle(model, RULES["naive_fusion"])[0].believed[0, 0, 0]
-    doubt = f"it believes {believed:.3g} m² and has {naive[-1]:.3g} m²"
-    if worse[-1]:
-        first = int(np.flatnonzero(~worse)[-1]) + 1 if (~worse).any() else 1
-        when = "from the first step" if first <= 1 else f"after {first} steps"
+    naive, alone = recursion.history(model, RULES["naive_fusion"], steps), recursion.history(model, None, steps)
+    worse = [bool(a.actual_of(0)[0, 0] > b.actual_of(best)[0, 0] * (1 + 1e-12)) for a, b in zip(naive, alone)]
+    last, single = steady["naive_fusion"], steady["single_sensor"]
+    if last is None or single is None:
+        last = {"believed": float(naive[-1].believed[0, 0, 0]), "actual": float(naive[-1].actual_of(0)[0, 0])}
+        in_the_end = worse[-1]
+    else:
+        in_the_end = last["actual"] > single["actual"] * (1 + 1e-12)
+    doubt = f"it believes {last['believed']:.3g} m² and has {last['actual']:.3g} m²"
+    if in_the_end:
+        safe = [k for k, bad in enumerate(worse) if not bad]
+        if safe[-1] == steps:
+            when = f"though only after more than {steps} steps"
+        else:
+            when = f"after {safe[-1] + 1} steps" if safe[-1] else "from the first step"
         return f"Do not: naive fusion is worse than one sensor alone here, {when}; {doubt}."
-    if worse[1:].any():
+    if any(worse):
         return f"Naive fusion is worse than one sensor alone at first and better in the long run; {doubt}."
     return f"You may: naive fusion stays better than one sensor alone here, though it is too sure of itself; {doubt}."

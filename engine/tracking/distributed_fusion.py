@@ -1,44 +1,44 @@
-"""Optimal distributed fusion (RC eq. 6-8): a weighted sum of estimates, the weight minimizing its error's volume."""
+"""Optimal distributed fusion (RC eq. 6-8): a weighted sum of estimates, the weights minimizing its error's volume."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from engine.gaussian.forms import symmetric, transpose
-from engine.tracking.recursion import Fused
-from engine.tracking.scalar_weight import smallest_volume
+from engine.tracking.combination import best_weights, combined
+from engine.tracking.recursion import LEAST, Fused
+
+#: Rounds of the search in more than one dimension; it stops where no weight moves by more than STILL, which leaves
+#: the volume right to its square.
+MOST, STILL = 100, 1e-7
 
 
 def distributed_fusion(believed: np.ndarray, actual: np.ndarray) -> Fused:
-    """y_f = (1 - l) y_1 + l y_2 with the l in [0, 1] of the smallest det E[(y_f - x)(y_f - x)'] (RC eq. 8).
+    """y_f = sum_j l_j y_j, sum_j l_j = 1, with the l of the smallest det E[(y_f - x)(y_f - x)'] (RC eq. 8).
 
-    One number weighs all components, as in the paper; more than two estimates are folded in one after the other.
-    In one dimension this is state vector fusion. actual (..., N, n, N, n) is tracked, so what is believed is so.
+    One number weighs all components of an estimate, as in the paper; in one dimension this is state vector fusion.
+    actual (..., N, n, N, n) is tracked, so what is believed is so.
     """
-    N, n = believed.shape[-3:-1]
-    cases = believed.shape[:-3]
-    scalar = np.zeros((*cases, N))
-    scalar[..., 0] = 1.0
-    for j in range(1, N):
-        P11 = np.einsum("...a,...aibk,...b->...ik", scalar, actual, scalar, optimize=True)
-        P12 = np.einsum("...a,...aik->...ik", scalar, actual[..., :, :, j, :], optimize=True)
-        P22 = actual[..., j, :, j, :]
-        cross = P12 + transpose(P12)
-
-        def mixed(w: np.ndarray, P11=P11, P22=P22, cross=cross) -> np.ndarray:
-            return (1 - w) ** 2 * P11 + w**2 * P22 + w * (1 - w) * cross
-
-        weight = _best(P11, P12, P22, n, mixed, cases)
-        scalar = (1 - weight)[..., None] * scalar
-        scalar[..., j] += weight
-    weights = scalar[..., None, None] * np.eye(n)
-    return Fused(weights, symmetric(np.einsum("...a,...aibk,...b->...ik", scalar, actual, scalar, optimize=True)))
+    eye = np.eye(believed.shape[-1])
+    l = best_weights(actual)[..., 0, 0] if len(eye) == 1 else _smallest_volume(actual)
+    weights = l[..., None, None] * eye
+    return Fused(weights, combined(weights, actual))
 
 
-def _best(P11, P12, P22, n, mixed, cases) -> np.ndarray:
-    """The best weight of the second estimate: in one dimension in closed form (RC eq. 8 and 13)."""
-    if n > 1:
-        return smallest_volume(mixed, cases)
-    a, b, c = P11[..., 0, 0], P12[..., 0, 0], P22[..., 0, 0]
-    spread = a + c - 2 * b
-    return np.clip(np.divide(a - b, spread, out=np.zeros_like(spread), where=spread > 1e-15 * (a + c)), 0.0, 1.0)
+def _smallest_volume(joint: np.ndarray) -> np.ndarray:
+    """The weights l (..., N), summing to one, of the smallest det sum_ab l_a l_b P_ab.
+
+    log det is concave, so from any M it is at most log det M + tr(M^-1 (P - M)), which is quadratic in l: to minimize
+    that again and again never makes the volume larger. There can be several valleys: the search starts from every
+    estimate alone and keeps the best.
+    """
+    eye = np.eye(joint.shape[-1])
+    P = np.moveaxis(np.einsum("...aiak->...aik", joint), -3, 0)
+    l = np.zeros((len(P), *joint.shape[:-3]))
+    for _ in range(MOST):
+        trace = np.einsum("s...ki,...aibk->s...ab", np.linalg.inv(P + LEAST * eye), joint, optimize=True)
+        before, l = l, best_weights(trace[..., :, None, :, None])[..., 0, 0]
+        P = combined(l[..., None, None] * eye, joint)
+        if np.abs(l - before).max() < STILL:
+            break
+    best = np.argmin(np.linalg.slogdet(P + LEAST * eye)[1], axis=0)
+    return np.take_along_axis(l, best[None, ..., None], axis=0)[0]

@@ -36,6 +36,9 @@ class Fused:
     believed: np.ndarray
 
 
+#: Added to the variances a rule inverts, m^2: nothing beside any sensor, and enough where somebody claims perfection.
+LEAST = 1e-150
+
 #: A fusion rule: from the believed covariances (..., N, n, n) and the actual joint one (..., N, n, N, n) of the
 #: estimates that met. Only rules that track cross-covariances may look at the latter's off-diagonal blocks.
 Rule = Callable[[np.ndarray, np.ndarray], Fused]
@@ -54,8 +57,9 @@ def predict(model: Model, nodes: Nodes) -> Nodes:
     """The target moves: the same process noise enters everybody's error (RC eq. 1)."""
     F, Q = model.F, model.Q
     believed = F[..., None, :, :] @ nodes.believed @ transpose(F)[..., None, :, :] + Q[..., None, :, :]
-    actual = np.einsum("...ij,...ajbk,...lk->...aibl", F, nodes.actual, F, optimize=True)
-    return Nodes(believed, actual + Q[..., None, :, None, :])
+    F = F[..., None, None, :, :]
+    blocks = F @ np.swapaxes(nodes.actual, -3, -2) @ transpose(F)
+    return Nodes(believed, np.swapaxes(blocks + Q[..., None, None, :, :], -3, -2))
 
 
 def gain(model: Model, believed: np.ndarray, node: int) -> np.ndarray:
@@ -108,8 +112,15 @@ def fuse(nodes: Nodes, rule: Rule, heard: np.ndarray | None = None) -> tuple[Nod
                 rows[:, met] = fused.weights
                 W[where, i] = rows
                 believed[where, i] = fused.believed
-    actual = np.einsum("...abij,...bjck,...dclk->...aidl", W, nodes.actual, W, optimize=True)
-    return Nodes(believed, 0.5 * (actual + np.moveaxis(actual, (-4, -3), (-2, -1)))), W
+    return Nodes(believed, mixed(W, nodes.actual)), W
+
+
+def mixed(W: np.ndarray, joint: np.ndarray) -> np.ndarray:
+    """The joint covariance (..., A, n, A, n) of the errors y_a' = sum_b W_ab y_b; W (..., A, N, n, n)."""
+    A, N, n = W.shape[-4:-1]
+    stacked = np.swapaxes(W, -3, -2).reshape(*W.shape[:-4], A * n, N * n)
+    cov = stacked @ joint.reshape(*joint.shape[:-4], N * n, N * n) @ transpose(stacked)
+    return symmetric(cov).reshape(*cov.shape[:-2], A, n, A, n)
 
 
 def step(model: Model, nodes: Nodes, rule: Rule | None) -> Nodes:
@@ -124,30 +135,6 @@ def history(model: Model, rule: Rule | None, steps: int) -> list[Nodes]:
     for _ in range(steps):
         seen.append(step(model, seen[-1], rule))
     return seen
-
-
-def settle(
-    model: Model, rule: Rule | None, *, tolerance: float = 1e-13, most: int = 20_000
-) -> tuple[Nodes, np.ndarray]:
-    """Iterate to the steady state; also which cases (...) arrived there to the relative tolerance.
-
-    The beliefs' Riccati maps contract; the actual covariance follows a linear recursion whose rate is that of the
-    slowest error mode, so it is iterated until both stand still.
-    """
-    now = start(model)
-    settled = np.zeros(now.believed.shape[:-3], bool)
-    for _ in range(most):
-        after = step(model, now, rule)
-        change = np.maximum(_moved(now.believed, after.believed, 3), _moved(now.actual, after.actual, 4))
-        now, settled = after, change < tolerance
-        if settled.all():
-            break
-    return now, settled
-
-
-def _moved(before: np.ndarray, after: np.ndarray, axes: int) -> np.ndarray:
-    last = tuple(range(-axes, 0))
-    return np.abs(after - before).max(axis=last) / np.abs(after).max(axis=last)
 
 
 def central(model: Model, P: np.ndarray) -> np.ndarray:

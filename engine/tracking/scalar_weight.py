@@ -1,4 +1,4 @@
-"""The weight in [0, 1] that makes a covariance's volume smallest, for many cases at once."""
+"""The one weight between two covariances by which covariance intersection and its inverse choose theirs."""
 
 from __future__ import annotations
 
@@ -6,33 +6,29 @@ from collections.abc import Callable
 
 import numpy as np
 
-#: Rounds of the search: the weight is then known to 1e-9.
-ROUNDS = 43
-_GOLDEN = (np.sqrt(5.0) - 1) / 2
+from engine.gaussian.forms import transpose
+
+#: Halvings of [0, 1]: the weight is then known to round-off. Ratios closer to one than TIED are no difference.
+HALVINGS, TIED = 53, 1e-12
 
 
-def smallest_volume(cov_at: Callable[[np.ndarray], np.ndarray], cases: tuple[int, ...]) -> np.ndarray:
-    """argmin over w in [0, 1] of det cov_at(w), by golden section and its two ends; w (*cases,).
+def ratios(P1: np.ndarray, P2: np.ndarray) -> np.ndarray:
+    """The variances (..., n) of P1 along the axes in which P2 is the identity and P1 is diagonal."""
+    root = np.linalg.inv(np.linalg.cholesky(P2))
+    return np.linalg.eigvalsh(root @ P1 @ transpose(root))
 
-    cov_at takes weights (*cases, 1, 1) and gives covariances (*cases, n, n) whose determinant is unimodal in w.
+
+def balance(slope: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> np.ndarray:
+    """Where in [0, 1] a slope that falls with the weight crosses zero, by bisection; an end where it does not.
+
+    slope takes w (..., 1) and gives (...,). Where the ratios q (..., n) are all one, every weight is as good: it is one
+    half there, so that round-off does not choose among equals.
     """
-
-    def volume(w: np.ndarray) -> np.ndarray:
-        return np.linalg.slogdet(cov_at(w[..., None, None]))[1]
-
-    low, high = np.zeros(cases), np.ones(cases)
-    a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_a, at_b = volume(a), volume(b)
-    for _ in range(ROUNDS):
-        left = at_a < at_b
-        high, low = np.where(left, b, high), np.where(left, low, a)
-        a_next = np.where(left, high - _GOLDEN * (high - low), b)
-        b_next = np.where(left, a, low + _GOLDEN * (high - low))
-        fresh = volume(np.where(left, a_next, b_next))
-        at_a, at_b = np.where(left, fresh, at_b), np.where(left, at_a, fresh)
-        a, b = a_next, b_next
-    found = 0.5 * (low + high)
-    candidates = np.stack([found, np.zeros(cases), np.ones(cases)])
-    volumes = np.stack([volume(c) for c in candidates])
-    best = np.argmin(volumes, axis=0)
-    return np.take_along_axis(candidates, best[None], axis=0)[0]
+    tied = np.asarray((np.abs(q - 1) < TIED).all(axis=-1))
+    low, high = np.zeros(tied.shape), np.ones(tied.shape)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        rising = slope(middle[..., None]) > 0
+        low, high = np.where(rising, middle, low), np.where(rising, high, middle)
+    w = np.where(slope(np.zeros((*tied.shape, 1))) <= 0, 0.0, np.where(slope(np.ones((*tied.shape, 1))) >= 0, 1.0, low))
+    return np.where(tied, 0.5, w)

@@ -15,7 +15,7 @@ from stonesoup.types.hypothesis import SingleHypothesis
 from stonesoup.types.prediction import GaussianStatePrediction
 from stonesoup.updater.chernoff import ChernoffUpdater
 
-from engine.tracking import recursion, simulate
+from engine.tracking import recursion, simulate, steady
 from engine.tracking.covariance_intersection import covariance_intersection
 from engine.tracking.model import Model, make
 from engine.tracking.rules import RULES
@@ -55,13 +55,13 @@ def test_one_step_of_figure_3():
 def test_steady_states_of_figure_6(point):
     q, r1, r2 = point
     model, told = make(float(q), [float(r1), float(r2)], 10.0), STEADY[point]
-    naive, settled = recursion.settle(model, RULES["naive_fusion"])
+    naive, settled = steady.settle(model, RULES["naive_fusion"])
     assert settled.all()
     assert naive.believed[0, 0, 0] == pytest.approx(told["naive"][0], rel=1e-6)
     assert naive.actual_of(0)[0, 0] == pytest.approx(told["naive"][1], rel=1e-6)
-    optimal, _ = recursion.settle(model, RULES["distributed_fusion"])
+    optimal, _ = steady.settle(model, RULES["distributed_fusion"])
     assert optimal.actual_of(1)[0, 0] == pytest.approx(told["df"], rel=1e-6)
-    assert recursion.settle(model, None)[0].actual_of(0)[0, 0] == pytest.approx(told["single"], rel=1e-6)
+    assert steady.settle(model, None)[0].actual_of(0)[0, 0] == pytest.approx(told["single"], rel=1e-6)
     assert central_steady(model) == pytest.approx(told["central"], rel=1e-6)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.tracking import analysis, recursion, regions
+from engine.tracking import analysis, regions, steady
 from engine.tracking.model import make
 from engine.tracking.rules import RULES
 
@@ -37,12 +37,12 @@ def test_the_boundaries_divide_the_maps():
 def test_the_asymptotic_map_is_the_recursion_run_to_its_end(r):
     model = make(1.0, list(r), 1.0)
     told = regions.asymptotic(*r)
-    naive = recursion.settle(model, RULES["naive_fusion"])[0]
+    naive = steady.settle(model, RULES["naive_fusion"])[0]
     assert told.naive == pytest.approx(naive.actual_of(0)[0, 0], rel=1e-9)
     assert told.naive_believed == pytest.approx(naive.believed[0, 0, 0], rel=1e-9)
-    optimal = recursion.settle(model, RULES["state_vector_fusion"])[0]
+    optimal = steady.settle(model, RULES["state_vector_fusion"])[0]
     assert told.distributed == pytest.approx(optimal.actual_of(0)[0, 0], rel=1e-9)
-    alone = recursion.settle(model, None)[0]
+    alone = steady.settle(model, None)[0]
     assert told.single == pytest.approx(min(alone.actual_of(i)[0, 0] for i in range(2)), rel=1e-9)
 
 
@@ -94,3 +94,45 @@ def test_an_operating_point_is_analysed_from_every_side():
 def test_an_analysis_is_bounded_in_size(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         analysis.analyse(**{"process": 1.0, "sensors": [1.0, 2.0], "prior": 1.0, **wrong})
+
+
+@pytest.mark.parametrize("r", [(1e-6, 1e6), (1e6, 2e6), (1e-6, 2e-6), (1e5, 2.0)])
+def test_the_asymptotic_map_holds_at_its_far_corners(r):
+    model = make(1.0, list(r), 1.0)
+    told = regions.asymptotic(*r)
+    for figure, rule in (("distributed", "distributed_fusion"), ("naive", "naive_fusion")):
+        nodes, settled = steady.settle(model, RULES[rule])
+        assert settled
+        assert getattr(told, figure) == pytest.approx(nodes.actual_of(0)[0, 0], rel=1e-8)
+    believed = steady.settle(model, RULES["covariance_intersection"])[0].believed[0, 0, 0]
+    assert told.intersection == pytest.approx(believed, rel=1e-8)
+
+
+def test_a_map_of_many_decades_is_between_central_filter_and_single_sensor_everywhere():
+    r = np.geomspace(1e-6, 1e6, 400)
+    told = regions.asymptotic(r[:, None], r[None, :])
+    assert np.all(told.central <= told.distributed * (1 + 1e-12))
+    assert np.all(told.distributed <= told.single * (1 + 1e-12))
+    P = told.distributed
+    np.testing.assert_allclose(P, regions._distributed(P + 1, r[:, None], r[None, :])[0], rtol=1e-10)
+
+
+@pytest.mark.parametrize("steps", [1, None])
+def test_in_two_dimensions_intersection_costs_and_state_vector_fusion_pays(steps):
+    """Central <= state vector fusion <= single; crossed sensors let covariance intersection gain as well."""
+    r = np.geomspace(0.2, 20, 8)
+    told = regions.turned(r[:, None], r[None], elongation=4.0, angle_rad=np.pi / 2, steps=steps)
+    assert np.all(told.central <= told.distributed * (1 + 1e-9))
+    assert np.all(told.distributed <= told.single * (1 + 1e-9))
+    assert np.all(told.intersection <= told.single * (1 + 1e-9))
+    assert np.diagonal(told.intersection / told.single).max() < 0.95
+    assert np.all(told.naive_believed < told.naive)
+    with pytest.raises(ValueError, match="steps"):
+        regions.turned(r, r, elongation=2.0, angle_rad=0.0, steps=3)
+
+
+@pytest.mark.parametrize("process", [0.0, 1e-9, 1e9])
+def test_extreme_targets_are_analysed_too(process):
+    told = analysis.analyse(process, [10.0, 20.0], 0.0, steps=5, trials=10)
+    assert (told["steady"]["naive_fusion"] is None) == (process == 0)
+    assert all(np.isfinite(h["actual"]).all() for h in told["histories"].values())
