@@ -16,8 +16,9 @@ ABOVE = np.concatenate([np.array([0.0, -0.01, 1.45]) * SPAN, np.zeros(3)])
 
 #: While one pane's camera moves, and this long after, the others follow and do not lead.
 LEAD_S = 0.3
-#: A viewer that has not come to the pose it was given by then is being moved by its user.
-SETTLE_S = 2.0
+#: A viewer that is not at the pose it was given is told again this often; one that has not come to it by the
+#: deadline, however busy its machine, is being moved by its user.
+TELL_S, SETTLE_S = 0.3, 20.0
 #: Poses closer than this (scene units) are the same.
 SAME = 0.01
 
@@ -44,15 +45,20 @@ class Cameras:
 
         @pane.server.on_client_connect
         def connected(client: viser.ClientHandle) -> None:
-            deadline, settled = time.monotonic() + SETTLE_S, False
+            told, settled = time.monotonic(), False
+            deadline = told + SETTLE_S
 
             @client.camera.on_update
             def moved(camera: viser.CameraHandle) -> None:
-                nonlocal settled
-                pose = np.concatenate([camera.position, camera.look_at])
+                nonlocal told, settled
+                pose, now = np.concatenate([camera.position, camera.look_at]), time.monotonic()
                 if settled:
                     self._loop.call_soon_threadsafe(self._lead, pane, pose)
-                settled = settled or np.allclose(pose, self.pose, atol=SAME) or time.monotonic() > deadline
+                    return
+                settled = np.allclose(pose, self.pose, atol=SAME) or now > deadline
+                if not settled and now - told > TELL_S:
+                    told = now
+                    _turn(client, self.pose)
 
             _turn(client, self.pose)
 

@@ -70,5 +70,6 @@ def test_three_estimators_run_side_by_side(page: Page, keep):
     assert page.locator(".pane").evaluate_all("all => all.map(p => p.dataset.algorithm)") == THREE
     expect(page.locator(".pane .verdict")).to_have_count(3)
     see_the_vehicles(page, THREE)
-    expect(page.locator(".plot .js-plotly-plot")).to_have_count(2)
+    for quantity in ("sigma_m", "error_m"):
+        expect(page.locator(f".plot[data-quantity={quantity}] .js-line")).to_have_count(3)
     keep(page)

@@ -112,7 +112,8 @@ def test_without_webgl_the_rest_remains(context: BrowserContext, run: str, keep)
     page.goto(f"/#run={run}")
     expect(page.locator("#panes .note")).to_contain_text("WebGL")
     expect(page.locator(".pane")).to_have_count(0)
-    expect(page.locator(".plot .js-line")).to_have_count(6)
+    for quantity in ("sigma_m", "error_m"):
+        expect(page.locator(f".plot[data-quantity={quantity}] .js-line")).to_have_count(3)
     expect(page.locator("#table tbody tr")).to_have_count(6)
     keep(page)
 
