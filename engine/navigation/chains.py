@@ -289,7 +289,9 @@ def _odometry_chain(log: VehicleLog, odometry: Odometry, breakpoints_s: np.ndarr
         for k in range(len(times) - 1)
     ]
     ends = np.searchsorted(times, breakpoints_s)
-    steps: list[Step] = [pieces[a] if b - a == 1 else OdometrySteps(tuple(pieces[a:b])) for a, b in itertools.pairwise(ends)]
+    steps: list[Step] = [
+        pieces[a] if b - a == 1 else OdometrySteps(tuple(pieces[a:b])) for a, b in itertools.pairwise(ends)
+    ]
     mean = np.concatenate(
         [
             np.broadcast_to(start.position_m, (trials, 2)),
