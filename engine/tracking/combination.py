@@ -22,7 +22,7 @@ def best_weights(joint: np.ndarray) -> np.ndarray:
         away = joint - to_first
         spread = (away - away[..., :1, :, :, :])[..., 1:, :, 1:, :].reshape(*cases, (N - 1) * n, (N - 1) * n)
         cross = (to_first[..., :1, :, :, :] - joint[..., :1, :, 1:, :]).reshape(*cases, n, (N - 1) * n)
-        K = cross @ _pseudoinverse(symmetric(spread))
+        K = cross @ pseudoinverse(symmetric(spread))
         weights[..., 1:, :, :] = np.moveaxis(K.reshape(*cases, n, N - 1, n), -2, -3)
     weights[..., 0, :, :] = np.eye(n) - weights[..., 1:, :, :].sum(axis=-3)
     return weights
@@ -35,7 +35,7 @@ def combined(weights: np.ndarray, joint: np.ndarray) -> np.ndarray:
     return symmetric(row @ joint.reshape(*joint.shape[:-4], N * n, N * n) @ transpose(row))
 
 
-def _pseudoinverse(matrix: np.ndarray) -> np.ndarray:
+def pseudoinverse(matrix: np.ndarray) -> np.ndarray:
     """Of a symmetric (..., k, k); a single number's without a decomposition."""
     if matrix.shape[-1] == 1:
         return np.divide(1.0, matrix, out=np.zeros_like(matrix), where=matrix > 0)

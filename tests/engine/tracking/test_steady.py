@@ -96,3 +96,17 @@ def test_a_map_is_its_cells_one_by_one():
     for i in range(3):
         cell = steady.settle(make(np.eye(2), [R[i], turned], np.eye(2)), RULES["covariance_intersection"])[0]
         np.testing.assert_allclose(whole.actual[i], cell.actual, rtol=1e-8)
+
+
+def test_equal_crossed_sensors_make_distributed_fusion_take_turns():
+    """Two weights of equal volume: one number for both components prefers one sensor now and the other next."""
+    R = np.diag([0.05, 0.05 / 9])
+    c, s = np.cos(1.0), np.sin(1.0)
+    turn = np.array([[c, -s], [s, c]])
+    model = make(np.eye(2), [R, turn @ R @ turn.T], np.eye(2))
+    rule = RULES["distributed_fusion"]
+    assert not steady.settle(model, rule)[1]
+    third, second, last = (nodes.believed[0] for nodes in recursion.history(model, rule, 300)[-3:])
+    np.testing.assert_allclose(last, third, rtol=1e-6)
+    assert np.abs(last - second).max() > 0.2 * last.max()
+    assert steady.settle(model, RULES["state_vector_fusion"])[1]
