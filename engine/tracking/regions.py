@@ -7,6 +7,7 @@ Axes are normalized as in RC: r_i = R_i / (P + Q) for one step (eq. 18, Fig. 5),
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -222,3 +223,62 @@ def turned(r1: np.ndarray, r2: np.ndarray, *, elongation: float, angle_rad: floa
 def _size(cov: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Fourth root of det of (..., 2, 2); NaN where not known."""
     return np.where(known, np.linalg.det(np.where(known[..., None, None], cov, np.eye(2))), np.nan) ** 0.25
+
+
+def chart(kind: str, axis: np.ndarray, *, elongation: float = 1.0, angle_rad: float = 0.0) -> dict[str, Any]:
+    """A map over axis x axis in JSON's own types: rows are r2, columns r1; None where there is no value.
+
+    kind: "one_step" or "asymptotic". Sensors with round ellipses make the one-dimensional map; others the same with
+    square roots of determinants for variances. boundary: the r2 >= r1 above which naive fusion is dangerous, for each
+    r1 of the axis; for turned ellipses interpolated between cells, at the first crossing. Raises ValueError, naming
+    the argument, for an unknown kind, an axis that does not rise from above zero, or an impossible ellipse.
+    """
+    if kind not in ("one_step", "asymptotic"):
+        raise ValueError(f"kind: {kind!r}; give 'one_step' or 'asymptotic'")
+    axis = np.asarray(axis, float)
+    if axis.ndim != 1 or axis.size < 2 or not (axis[0] > 0 and np.all(np.diff(axis) > 0) and np.isfinite(axis[-1])):
+        raise ValueError("axis: give at least two finite values above zero, rising")
+    one = kind == "one_step"
+    if elongation == 1:
+        figures = (one_step if one else asymptotic)(axis[None, :], axis[:, None])
+        boundary, power = (one_step_boundary if one else asymptotic_boundary)(axis), 1
+    else:
+        steps = 1 if one else None
+        figures = turned(axis[None, :], axis[:, None], elongation=elongation, angle_rad=angle_rad, steps=steps)
+        boundary, power = _crossing(axis, figures.naive / figures.single), 2
+    ratios = {
+        "naive_to_single": figures.naive / figures.single,
+        "central_to_distributed": figures.central / figures.distributed,
+        "naive_believed_to_actual": figures.naive_believed / figures.naive,
+        "intersection_to_single": figures.intersection / figures.single,
+    }
+    return {
+        "kind": kind,
+        "axis": axis.tolist(),
+        "dangerous": figures.dangerous.astype(int).tolist(),
+        "boundary": _plain(boundary),
+        "ratios": {name: _plain(np.round(ratio**power, 6)) for name, ratio in ratios.items()},
+    }
+
+
+def _crossing(axis: np.ndarray, ratio: np.ndarray) -> np.ndarray:
+    """Where each column of ratio, from the diagonal on, first exceeds one: interpolated in logarithms, else NaN."""
+    worse = ~(ratio <= 1)
+    worse[np.tri(axis.size, k=-1, dtype=bool).T] = False
+    edge = np.full(axis.size, np.nan)
+    for column in np.flatnonzero(worse.any(axis=0)):
+        row = int(np.argmax(worse[:, column]))
+        below, above = np.log(ratio[max(row - 1, 0), column]), np.log(ratio[row, column])
+        if row == column or not np.isfinite(above):
+            edge[column] = axis[row]
+        else:
+            part = -below / (above - below)
+            edge[column] = axis[row - 1] * (axis[row] / axis[row - 1]) ** part
+    return edge
+
+
+def _plain(values: np.ndarray) -> list[Any]:
+    """Nested lists with None for what is not finite."""
+    told = values.astype(object)
+    told[~np.isfinite(values)] = None
+    return told.tolist()

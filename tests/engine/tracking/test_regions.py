@@ -136,3 +136,44 @@ def test_extreme_targets_are_analysed_too(process):
     told = analysis.analyse(process, [10.0, 20.0], 0.0, steps=5, trials=10)
     assert (told["steady"]["naive_fusion"] is None) == (process == 0)
     assert all(np.isfinite(h["actual"]).all() for h in told["histories"].values())
+
+
+@pytest.mark.parametrize("kind", ["one_step", "asymptotic"])
+def test_a_chart_of_nearly_round_sensors_is_the_one_dimensional_chart(kind):
+    axis = np.geomspace(0.1, 40, 20)
+    flat = regions.chart(kind, axis)
+    turned = regions.chart(kind, axis, elongation=1 + 1e-9, angle_rad=1.0)
+    assert flat["dangerous"] == turned["dangerous"]
+    for name in flat["ratios"]:
+        if name != "intersection_to_single":  # equal sensors are mixed in one dimension only where exactly equal
+            np.testing.assert_allclose(flat["ratios"][name], turned["ratios"][name], rtol=1e-4)
+    for r1, told, found in zip(axis, flat["boundary"], turned["boundary"]):
+        assert (found is None and told > axis[-1]) or found == pytest.approx(max(told, r1), rel=0.02)
+
+
+def test_a_charts_boundary_divides_its_cells():
+    axis = np.geomspace(0.1, 40, 24)
+    told = regions.chart("asymptotic", axis, elongation=3.0, angle_rad=0.6)
+    dangerous = np.array(told["dangerous"], bool)
+    np.testing.assert_array_equal(dangerous, dangerous.T)
+    for column, edge in enumerate(told["boundary"]):
+        safe = axis[column:][~dangerous[column:, column]]
+        assert (edge is None) == (safe.size == axis.size - column)
+        if edge is not None:
+            assert np.all(dangerous[axis > edge * (1 + 1e-9), column])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("sideways", [1, 2]), "kind"),
+        (("one_step", [1]), "axis"),
+        (("one_step", [0, 2]), "axis"),
+        (("one_step", [2, 1]), "axis"),
+        (("one_step", [1, np.inf]), "axis"),
+        (("one_step", [1, np.nan]), "axis"),
+    ],
+)
+def test_a_chart_refuses_what_it_cannot_draw(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        regions.chart(*arguments)
