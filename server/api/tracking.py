@@ -6,11 +6,14 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from fastapi import APIRouter
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from engine.tracking import analysis, regions
 
 router = APIRouter(prefix="/api/tracking", tags=["tracking"])
+
+#: A map of turned ellipses is iterated cell by cell, in two dimensions.
+MOST_TURNED = 48
 
 Variance = Annotated[float, Field(gt=0, le=1e9)]
 
@@ -34,9 +37,17 @@ class Map(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     kind: Literal["one_step", "asymptotic"] = "asymptotic"
-    size: int = Field(100, ge=2, le=400, description="cells along each axis")
+    size: int = Field(100, ge=2, le=400, description=f"cells along each axis; at most {MOST_TURNED} for long ellipses")
     smallest: float = Field(0.05, ge=1e-6, le=1e6)
     largest: float = Field(50.0, ge=1e-6, le=1e6)
+    elongation: float = Field(1.0, ge=1, le=100, description="of the sensors' ellipses: long axis to short one")
+    angle_deg: float = Field(0.0, ge=-360, le=360, description="between the two ellipses, degrees")
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Map:
+        if self.elongation > 1 and self.size > MOST_TURNED:
+            raise ValueError(f"size: {self.size} cells; at most {MOST_TURNED} where elongation is above 1")
+        return self
 
 
 @router.post("/analysis")
@@ -51,23 +62,13 @@ def analyse(point: Point) -> dict[str, Any]:
 def dangerous(wanted: Map) -> dict[str, Any]:
     """Where naive fusion is worse than the better sensor alone, its boundary, and ratio maps.
 
-    axis: r of both sensors (R / (P + Q) for one step, R / Q in the steady state); maps by rows of r2 over r1;
-    boundary: r2 over the axis for r1 <= r2, null where there is none.
+    axis: r of both sensors (R / (P + Q) for one step, R / Q in the steady state; along the long axis of an ellipse);
+    maps by rows of r2 over r1, of variances, or of square roots of determinants for ellipses; boundary: r2 over the
+    axis for r1 <= r2, null where there is none.
     """
     low, high = sorted((wanted.smallest, max(wanted.largest, wanted.smallest * 1.01)))
     axis = np.geomspace(low, high, wanted.size)
-    one_step = wanted.kind == "one_step"
-    figures = (regions.one_step if one_step else regions.asymptotic)(axis[None, :], axis[:, None])
-    edge = regions.one_step_boundary(axis) if one_step else regions.asymptotic_boundary(axis)
-    return {
-        "kind": wanted.kind,
-        "axis": axis.tolist(),
-        "dangerous": figures.dangerous.astype(int).tolist(),
-        "boundary": [float(r) if np.isfinite(r) else None for r in edge],
-        "ratios": {
-            "naive_to_single": np.round(figures.naive / figures.single, 6).tolist(),
-            "central_to_distributed": np.round(figures.central / figures.distributed, 6).tolist(),
-            "naive_believed_to_actual": np.round(figures.naive_believed / figures.naive, 6).tolist(),
-        },
-        "figure_6": [{"name": "a", "r1": 1.0, "r2": 1.5}, {"name": "b", "r1": 10.0, "r2": 20.0}],
-    }
+    chart = regions.chart(
+        wanted.kind, axis, elongation=wanted.elongation, angle_rad=float(np.radians(wanted.angle_deg))
+    )
+    return chart | {"figure_6": [{"name": "a", "r1": 1.0, "r2": 1.5}, {"name": "b", "r1": 10.0, "r2": 20.0}]}

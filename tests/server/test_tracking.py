@@ -22,6 +22,20 @@ def test_a_map_has_the_asked_size_and_its_boundary(live: Live, kind: str):
     assert {0, 1} == {cell for row in told["dangerous"] for cell in row}
 
 
+def test_a_map_of_turned_ellipses_shrinks_the_dangerous_region(live: Live):
+    body = {"size": 16, "elongation": 3}
+    along, across = (
+        live.http.post("/api/tracking/regions", json=body | {"angle_deg": angle}).json() for angle in (0, 90)
+    )
+    assert sum(map(sum, across["dangerous"])) < sum(map(sum, along["dangerous"]))
+    assert min(map(min, across["ratios"]["intersection_to_single"])) < 0.95
+
+
+def test_a_slow_target_is_answered_as_fast_as_any(live: Live):
+    told = live.http.post("/api/tracking/analysis", json={"process": 1e-9, "sensors": [10, 20], "prior": 10}).json()
+    assert told["steady"]["naive_fusion"]["actual"] > 1e3 * told["steady"]["single_sensor"]["actual"]
+
+
 @pytest.mark.parametrize(
     ("path", "body", "key"),
     [
@@ -30,6 +44,7 @@ def test_a_map_has_the_asked_size_and_its_boundary(live: Live, kind: str):
         ("analysis", {"process": 1, "sensors": [1, 2], "prior": 1, "trials": 10**9}, "trials"),
         ("regions", {"size": 100_000}, "size"),
         ("regions", {"kind": "sideways"}, "kind"),
+        ("regions", {"size": 400, "elongation": 3}, "size"),
     ],
 )
 def test_questions_out_of_bounds_are_problems_that_name_the_key(live: Live, path: str, body: dict, key: str):
