@@ -46,7 +46,7 @@ def frame_bytes(k: int) -> int:
 
 
 def write_bits(fields: list[tuple[str, int]], trials: int, values: dict[str, np.ndarray | int]) -> np.ndarray:
-    """Pack integers into bytes (trials, n) and append a CRC-16; a field left out is zero, too large a value saturates."""
+    """Pack integers into bytes (trials, n) with a CRC-16: a field left out is zero, too large a value saturates."""
     columns = []
     for name, bits in fields:
         width = abs(bits)
@@ -94,7 +94,7 @@ class Lattice:
 
 
 def onto_lattice(z: np.ndarray, R: np.ndarray, exponent: np.ndarray) -> Lattice:
-    """Round a composed relation z (trials, 2), R (trials, 2, 2): the covariance up, with at least the given exponent."""
+    """Round a composed relation z (trials, 2), R (trials, 2, 2), the covariance up, with no less than an exponent."""
     largest = np.maximum(R[:, 0, 0], R[:, 1, 1]) / VARIANCE_STEP_M2
     need = np.ceil(np.log2(np.maximum(largest, 1.0) / (_VARIANCE_LIMIT - 2)))
     exponent = np.clip(np.maximum(exponent, need), 0, 15).astype(int)

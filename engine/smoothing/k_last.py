@@ -1,0 +1,39 @@
+"""k-last (W15 section IV-C): a packet carries the new launch's link and the k most recent links with priors."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from engine.navigation.mission import NavigationMission
+from engine.navigation.network import run_nodes
+from engine.registry import Algorithm, Progress
+from engine.smoothing.fleet import make_nodes
+from engine.smoothing.sender import choose_last
+from engine.tracks import Tracks
+
+
+class Options(BaseModel):
+    """What a scenario may choose for k-last, under [options.k_last]."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    k: int = Field(2, ge=0, le=8, description="links with priors that each packet carries")
+    consistent: bool = Field(False, description="keep the approximate chain from being more certain than the true one")
+
+
+def run(mission: NavigationMission, progress: Progress) -> Tracks:
+    """Run k-last on a mission with the scenario's options."""
+    options = Options(**mission.options.get("k_last", {}))
+    return run_nodes(mission, progress, make_nodes(mission, options.k, choose_last, consistent=options.consistent))
+
+
+K_LAST = Algorithm(
+    name="k_last",
+    title="Factor composition, k-last",
+    family="smoothing",
+    summary="Every vehicle shares an approximate chain of its launches, repeating its latest priors, and smooths what "
+    "it heard. Shown is what a vehicle knew at the time.",
+    source="Walls, Cunningham and Eustice 2015, section IV",
+    run=run,
+    options=Options,
+)
