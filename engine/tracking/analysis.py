@@ -13,6 +13,8 @@ from engine.tracking.rules import RULES
 from engine.tracking.steady import settle, settle_centrally
 
 MOST_STEPS, MOST_TRIALS, MOST_SENSORS = 500, 20_000, 8
+#: Measurements simulated at most, steps x trials x sensors: about two seconds.
+MOST_DRAWS = 4_000_000
 WEIGHTS = 101
 
 
@@ -37,6 +39,8 @@ def analyse(
             raise ValueError(f"{name}: {value} is not between 1 and {most}")
     if len(sensors) > MOST_SENSORS:
         raise ValueError(f"sensors: {len(sensors)} given, at most {MOST_SENSORS}")
+    if steps * trials * len(sensors) > MOST_DRAWS:
+        raise ValueError(f"trials: {trials} over {steps} steps and {len(sensors)} sensors; at most {MOST_DRAWS} in all")
     model = make(process, sensors, prior)
     draws = simulate.draw(model, steps, trials, np.random.default_rng(seed))
     best = int(np.argmin(sensors))

@@ -26,9 +26,9 @@ def balance(slope: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> np.ndar
     """
     tied = np.asarray((np.abs(q - 1) < TIED).all(axis=-1))
     low, high = np.zeros(tied.shape), np.ones(tied.shape)
-    for _ in range(HALVINGS):
+    first, last = slope(low[..., None]) <= 0, slope(high[..., None]) >= 0
+    for _ in range(0 if np.all(first | last) else HALVINGS):
         middle = 0.5 * (low + high)
         rising = slope(middle[..., None]) > 0
         low, high = np.where(rising, middle, low), np.where(rising, high, middle)
-    w = np.where(slope(np.zeros((*tied.shape, 1))) <= 0, 0.0, np.where(slope(np.ones((*tied.shape, 1))) >= 0, 1.0, low))
-    return np.where(tied, 0.5, w)
+    return np.where(tied, 0.5, np.where(first, 0.0, np.where(last, 1.0, low)))

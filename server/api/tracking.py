@@ -30,6 +30,12 @@ class Point(BaseModel):
     trials: int = Field(2000, ge=1, le=analysis.MOST_TRIALS)
     seed: int = Field(1, ge=0, lt=2**63)
 
+    @model_validator(mode="after")
+    def _bounded(self) -> Point:
+        if self.steps * self.trials * len(self.sensors) > analysis.MOST_DRAWS:
+            raise ValueError(f"trials: steps x trials x sensors is at most {analysis.MOST_DRAWS}")
+        return self
+
 
 class Map(BaseModel):
     """A map over the two sensors' normalized noise, logarithmic in both."""

@@ -42,6 +42,7 @@ def test_a_slow_target_is_answered_as_fast_as_any(live: Live):
         ("analysis", {"process": 1, "sensors": [1, -2], "prior": 1}, "sensors"),
         ("analysis", {"process": 1, "sensors": [1], "prior": 1}, "sensors"),
         ("analysis", {"process": 1, "sensors": [1, 2], "prior": 1, "trials": 10**9}, "trials"),
+        ("analysis", {"process": 1, "sensors": [1] * 8, "prior": 1, "trials": 20_000, "steps": 500}, "trials"),
         ("regions", {"size": 100_000}, "size"),
         ("regions", {"kind": "sideways"}, "kind"),
         ("regions", {"size": 400, "elongation": 3}, "size"),

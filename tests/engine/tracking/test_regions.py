@@ -90,7 +90,9 @@ def test_an_operating_point_is_analysed_from_every_side():
     assert safe["verdict"].startswith("You may")
 
 
-@pytest.mark.parametrize("wrong", [{"steps": 0}, {"steps": 10**6}, {"trials": 0}, {"sensors": [1.0] * 99}])
+@pytest.mark.parametrize(
+    "wrong", [{"steps": 0}, {"steps": 10**6}, {"trials": 0}, {"trials": 20_000, "steps": 500}, {"sensors": [1.0] * 99}]
+)
 def test_an_analysis_is_bounded_in_size(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         analysis.analyse(**{"process": 1.0, "sensors": [1.0, 2.0], "prior": 1.0, **wrong})
