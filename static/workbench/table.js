@@ -22,6 +22,12 @@ const WHOLE = [
   ["Sent", "", "Packets broadcast, over all trials", (a) => count(a.packets.sent)],
   ["Heard", "", "Packets received, over all trials", (a) => count(a.packets.received)],
   ["Packet", "B", "Mean length of an encoded packet", (a) => (a.packets.sent ? number(a.packets.bytes_per_packet) : NONE)],
+  [
+    "Load",
+    "bit/s",
+    "Mean load on the shared channel; ! where it is more than the scenario's channel carries",
+    (a) => (a.packets.sent ? number(a.packets.bits_per_second) + (a.packets.exceeds_capacity ? " !" : "") : NONE),
+  ],
   ["CPU", "s", "Processor time of the estimator, over all trials", (a) => number(a.cpu_s, 2)],
 ];
 
