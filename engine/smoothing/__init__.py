@@ -3,5 +3,6 @@
 from engine.smoothing.centralized_smoother import CENTRALIZED_SMOOTHER
 from engine.smoothing.k_best import K_BEST
 from engine.smoothing.k_last import K_LAST
+from engine.smoothing.paull import PAULL
 
-REGISTERED = (K_LAST, K_BEST, CENTRALIZED_SMOOTHER)
+REGISTERED = (K_LAST, K_BEST, PAULL, CENTRALIZED_SMOOTHER)

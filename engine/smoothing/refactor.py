@@ -18,6 +18,8 @@ from engine.gaussian.forms import symmetric, transpose
 _BARRIER = tuple(10.0**-k for k in range(0, 12))
 _NEWTON_STEPS = 8
 _EDGE = 1e-12
+#: A matrix whose condition is worse than the inverse of this is on the edge of the cone.
+_SINGULAR = 1e-14
 
 
 @dataclass(frozen=True)
@@ -128,5 +130,5 @@ def _symmetric_basis(d: int) -> np.ndarray:
 def _log_det(matrix: np.ndarray) -> np.ndarray:
     """Logarithm of the determinant, minus infinity where the matrix is not positive definite."""
     values = np.linalg.eigvalsh(matrix)
-    inside = values[..., 0] > 0
+    inside = values[..., 0] > _SINGULAR * np.abs(values[..., -1])
     return np.where(inside, np.log(np.where(values > 0, values, 1.0)).sum(-1), -np.inf)
