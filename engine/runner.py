@@ -77,6 +77,12 @@ def chosen(scenario: ScenarioBase, algorithms: Sequence[str] | None = None) -> l
     return names
 
 
+def claimed(scenario: ScenarioBase) -> list[str]:
+    """The algorithms that checking the scenario's claims takes: its own, and those its claims are about."""
+    about = [a for c in scenario.claims for a in (c.algorithm, c.than.algorithm if c.than else None) if a]
+    return list(dict.fromkeys([*scenario.algorithms, *about]))
+
+
 def _faulty_options(scenario: ScenarioBase) -> list[Problem]:
     """What is wrong under [options.NAME]."""
     problems = []

@@ -81,8 +81,7 @@ def check(chosen: Namespace) -> int:
             print(f"{name}: makes no claims")
             continue
         print(f"{name}: {scenario.title}")
-        named = [a for c in scenario.claims for a in (c.algorithm, c.than.algorithm if c.than else None) if a]
-        for claim in _run(scenario, [*scenario.algorithms, *named], chosen.workers).claims:
+        for claim in _run(scenario, runner.claimed(scenario), chosen.workers).claims:
             print(f"  {_claim(claim)}")
             failed += claim["holds"] is False
     print(f"{failed} claim{'s' * (failed != 1)} failed" if failed else "no claim failed")
