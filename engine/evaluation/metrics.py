@@ -60,8 +60,8 @@ def evaluate(
     the mean over trials and times of the fourth root of the xy covariance's determinant, final_sigma_m its
     mean at the last time; sigma_growth its mean over the last quarter of the mission relative to the second, above
     one where uncertainty keeps growing; anees the mean over times of the NEES averaged over trials; max_deviation_m the
-    largest distance over trials and times between the mean and the benchmark's. Undefined or infinite figures
-    are None.
+    largest distance over trials and times between the mean and the benchmark's. A series of one subject becomes a
+    metric of the same name, its mean over trials and times. Undefined or infinite figures are None.
     """
     benchmark = results[centralized].beliefs if centralized is not None and centralized in results else {}
     return {
@@ -116,6 +116,11 @@ def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: 
         metrics["correlation"] = together
     if ranges:
         metrics["ranges"] = ranges
+    for key, curve in tracks.series.items():
+        what = key.partition("/")[0]
+        if curve.subjects == (subject,) and what not in metrics:
+            known = curve.value[np.isfinite(curve.value)]
+            metrics[what] = number(known.mean()) if known.size else None
     return metrics
 
 

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from engine.navigation.mission import NavigationMission
 from engine.navigation.network import run_nodes
 from engine.registry import Algorithm, Progress
+from engine.smoothing.fidelity import reconstruct
 from engine.smoothing.fleet import make_nodes
 from engine.smoothing.sender import choose_best
 from engine.tracks import Tracks
@@ -20,13 +21,17 @@ class Options(BaseModel):
     k: int = Field(2, ge=0, le=8, description="links with priors that each packet carries")
     loss: float = Field(0.5, ge=0, lt=1, description="fraction of packets the sender expects to be lost, r of eq. 17")
     consistent: bool = Field(False, description="keep the approximate chain from being more certain than the true one")
+    reconstruct_only: bool = Field(
+        False, description="only put the chains together and compare them with their targets, do not navigate"
+    )
 
 
 def run(mission: NavigationMission, progress: Progress) -> Tracks:
     """Run k-best on a mission with the scenario's options."""
     options = Options(**mission.options.get("k_best", {}))
     choose = choose_best(options.loss)
-    return run_nodes(mission, progress, make_nodes(mission, options.k, choose, consistent=options.consistent))
+    make = make_nodes(mission, options.k, choose, consistent=options.consistent)
+    return reconstruct(mission, progress, make) if options.reconstruct_only else run_nodes(mission, progress, make)
 
 
 K_BEST = Algorithm(

@@ -100,10 +100,13 @@ class SmootherNode:
                 self.turned = moved if self.turned is None else then(self.turned, moved)
 
     def transmit(self, launch: Launch) -> Packet:
-        depth = np.broadcast_to(launch.depth_m, (self.member.trials,))
-        data = self.sender.packet(self.launches, depth)
+        return Packet(self.broadcast(launch), self.floats)
+
+    def broadcast(self, launch: Launch) -> np.ndarray:
+        """Bytes (trials, n) of the next packet."""
+        data = self.sender.packet(self.launches, np.broadcast_to(launch.depth_m, (self.member.trials,)))
         self.launches += 1
-        return Packet(data, self.floats)
+        return data
 
     def receive(self, arrival: Arrival, data: np.ndarray) -> Innovation:
         """Add what the packet says of its sender's chain, the own pose now, and the range; solve."""
@@ -225,7 +228,7 @@ class SmootherNode:
         now = int(opened.sequence[trial])
         changed = [n for n, link in opened.links(trial) if mine.chain.add(n, link)]
         if self.member.sizes[sender] == 3:
-            return self._pose_launch(graph, sender, mine, now)
+            return self._pose_launch(graph, sender, mine, now, changed)
         return self._plane_launch(graph, sender, mine, now, changed)
 
     def _fixed_pose(self, graph: Growing, sender: int, opened, trial: int) -> np.ndarray:
@@ -284,7 +287,7 @@ class SmootherNode:
             L = symmetric(np.linalg.inv(prior[1]))
             graph.set(("prior", sender, b), idx, L, L @ graph.displacement(idx, prior[0]))
 
-    def _pose_launch(self, graph: Growing, sender: int, mine: Heard, now: int) -> np.ndarray:
+    def _pose_launch(self, graph: Growing, sender: int, mine: Heard, now: int, changed: list[int]) -> np.ndarray:
         """A launch pose in SE(2), tied to the last one heard; repeated links in between become poses too."""
         links, unknowns = mine.chain.links, mine.unknowns
         last = max(unknowns, default=-1)
@@ -302,9 +305,9 @@ class SmootherNode:
                 R = _positive(step.R)
                 graph.add_between(unknowns[before], idx, step.z, pose_information(R))
             unknowns[n] = idx
-        for n, idx in unknowns.items():
-            prior = links[n].prior
-            if prior is not None:
+        for n in changed:
+            prior, idx = links[n].prior, unknowns.get(n)
+            if prior is not None and idx is not None:
                 L = symmetric(np.linalg.inv(prior[1]))
                 off = graph.displacement(idx, prior[0])
                 off[2] = (off[2] + np.pi) % (2 * np.pi) - np.pi

@@ -20,6 +20,7 @@ from engine.navigation.network import Member, Packet, run_nodes
 from engine.navigation.ranging import Innovation, horizontal_range
 from engine.registry import Algorithm, Progress
 from engine.smoothing import packets
+from engine.smoothing.fidelity import reconstruct
 from engine.smoothing.fleet import launches_of, make_sender
 from engine.smoothing.local_chain import local_chain
 from engine.smoothing.node import Heard, Sender, SmootherNode
@@ -39,6 +40,9 @@ class Options(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     priors: int = Field(1, ge=0, le=4, description="single fixes that each packet carries, with their poses")
+    reconstruct_only: bool = Field(
+        False, description="only put the chains together and compare them with their targets, do not navigate"
+    )
 
 
 def frame_fields(vehicles: int, priors: int) -> list[tuple[str, int]]:
@@ -155,9 +159,16 @@ class PaullNode(SmootherNode):
         return [v for v in range(len(self.member.sizes)) if v != vehicle]
 
     def transmit(self, launch: Launch) -> Packet:
+        if self.poses is not None:
+            pose = int(self.poses.of_launch[self.launches])
+            for trial in range(self.member.trials):
+                self.own_launches[trial][pose] = self.own_pose(trial)
+        return super().transmit(launch)
+
+    def broadcast(self, launch: Launch) -> np.ndarray:
         """The launch's link, ranges since the last launch with their poses, single fixes with theirs."""
         if self.poses is None:
-            return super().transmit(launch)
+            return super().broadcast(launch)
         poses, n, trials = self.poses, self.launches, self.member.trials
         pose = int(poses.of_launch[n])
         sender = poses.sender
@@ -191,9 +202,7 @@ class PaullNode(SmootherNode):
             values |= {f"p{slot}.there": 1, f"p{slot}.pose": at}
             values |= packets.odometry_values(f"p{slot}", near) | packets.prior_values(f"p{slot}", mean, cov, near)
         self.launches += 1
-        for trial in range(trials):
-            self.own_launches[trial][pose] = self.own_pose(trial)
-        return Packet(packets.write_bits(self.fields, trials, values), self.floats)
+        return packets.write_bits(self.fields, trials, values)
 
     def _range_slot(self, prefix: str, latest: Measured, stretch: int) -> dict[str, np.ndarray]:
         assert self.poses is not None
@@ -299,9 +308,8 @@ class PaullNode(SmootherNode):
         return None if heard is None else heard.unknowns.get(pose)
 
 
-def run(mission: NavigationMission, progress: Progress) -> Tracks:
-    """Run Paull's method on a mission with the scenario's options."""
-    options = Options(**mission.options.get("paull", {}))
+def make_nodes(mission: NavigationMission, options: Options) -> Callable[[Member], PaullNode]:
+    """A function from a vehicle's own knowledge to its node."""
 
     def make(member: Member) -> PaullNode:
         v = member.index
@@ -310,7 +318,14 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
             return PaullNode(member, poses.sender, poses, options)
         return PaullNode(member, make_sender(mission, member, 0, choose_last, False), None, options)
 
-    return run_nodes(mission, progress, make)
+    return make
+
+
+def run(mission: NavigationMission, progress: Progress) -> Tracks:
+    """Run Paull's method on a mission with the scenario's options."""
+    options = Options(**mission.options.get("paull", {}))
+    make = make_nodes(mission, options)
+    return reconstruct(mission, progress, make) if options.reconstruct_only else run_nodes(mission, progress, make)
 
 
 PAULL = Algorithm(
