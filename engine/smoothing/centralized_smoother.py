@@ -15,9 +15,10 @@ from engine.navigation.mission import Arrival, Launch, NavigationMission, Report
 from engine.navigation.network import members
 from engine.navigation.ranging import horizontal_range
 from engine.registry import Algorithm, Progress
+from engine.smoothing.ambiguity import WIDE_M, Judged, likeliest, starts
 from engine.smoothing.composition import oplus
 from engine.smoothing.graph import Gaussians, Graph, Ranges, priors
-from engine.smoothing.smoother import Solution, smooth
+from engine.smoothing.smoother import Solution
 from engine.smoothing.trajectory import (
     Links,
     PoseChain,
@@ -150,7 +151,7 @@ class Centralized:
             stacked(c.steps, mission.trials) if c.initial.mean.shape[-1] != 3 else None for c in mission.chains
         ]
 
-    def solve(self, trial: int) -> tuple[Numbering, Graph, Solution]:
+    def solve(self, trial: int) -> tuple[Numbering, Graph, Judged]:
         """One trial's graph and its solution, starting from what the filter thought."""
         mission, log = self.mission, self.mission.log
         chains: list[PoseChain | Links | None] = []
@@ -183,7 +184,20 @@ class Centralized:
         accepted = self.filtered.accepted
         used = [accepted[r.arrival.index, r.arrival.vehicle][trial] for r, _ in self.heard(trial)]
         weights = [np.array(used, float)] if ranges else []
-        return numbering, graph, smooth(graph, weights=weights, gate_sigma=log.gate_sigma, settled=SETTLED_M)
+        wide = [
+            numbering.poses[v][0]
+            for v, (chain, own) in enumerate(zip(mission.chains, chains))
+            if own is None and np.linalg.eigvalsh(row(chain.initial.cov, trial))[-1] > WIDE_M**2
+        ]
+        tried = starts(graph, wide, reference)
+        judged = likeliest(
+            graph,
+            tried,
+            weights=weights if len(tried) == 1 else None,
+            gate_sigma=log.gate_sigma,
+            settled=SETTLED_M,
+        )
+        return numbering, graph, judged
 
     def _start(self, trial: int, numbering: Numbering, chains: list[PoseChain | Links | None]) -> np.ndarray:
         """The filter's states; poses that a fix puts between breakpoints follow from the one before by odometry."""
@@ -238,9 +252,12 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
     pairs = [(i, j) for n, i in enumerate(moving) for j in moving[n + 1 :]]
     correlation = {pair: np.zeros((trials, T)) for pair in pairs}
     ranges = _RangeRecord(centralized.receptions, trials)
-    unsettled, refused = [], 0
+    unsettled, ambiguous, refused = [], [], 0
     for trial in range(trials):
-        numbering, graph, solution = centralized.solve(trial)
+        numbering, graph, judged = centralized.solve(trial)
+        solution = judged.solution
+        if judged.rival_m is not None:
+            ambiguous.append(judged.rival_m)
         inverse = solution.inverse()
         for v in range(len(names)):
             idx = numbering.idx[v][at[v], :2]
@@ -256,6 +273,11 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
     notes = []
     if unsettled:
         notes.append(f"least squares did not settle in {len(unsettled)} of {trials} trials")
+    if ambiguous:
+        notes.append(
+            f"ambiguous in {len(ambiguous)} of {trials} trials: another solution, up to {max(ambiguous):.0f} m "
+            "away, fits the ranges nearly as well"
+        )
     if refused:
         notes.append(f"refused {refused} ranges as gross errors")
     return Tracks(

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from engine.smoothing.ambiguity import likeliest, starts
+from engine.smoothing.band import NotPositiveDefinite
+from engine.smoothing.graph import Graph, Ranges, increments, priors
+from engine.smoothing.growing import BORDER, Growing
 from engine.smoothing.smoother import smooth
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -28,3 +33,88 @@ def test_gtsam_agrees_on_means_and_marginals(seed):
     for k, (mean, P) in gtsam_solution(facts, graph.reference[: graph.banded].reshape(-1, d), d).items():
         np.testing.assert_allclose(ours.x[idx[k]], mean, atol=1e-6)
         np.testing.assert_allclose(cov[k], P, rtol=1e-6, atol=1e-6 * np.abs(P).max())
+
+
+def test_gross_range_errors_are_refused_whatever_the_start():
+    """A tenth of the ranges 30 to 200 m too long: refused to the last one, the answer as without them."""
+    rng = np.random.default_rng(7)
+    graph, _ = random_graph(rng, vehicles=2, poses=60, range_every=1)
+    clean = smooth(graph)
+    group = graph.ranges[0]
+    bad = rng.random(len(group.value)) < 0.1
+    value = group.value + np.where(bad, rng.uniform(30, 200, len(bad)), 0)
+    spoilt = replace(graph, ranges=(replace(group, value=value),))
+    found = smooth(spoilt, gate_sigma=4.0)
+    assert not found.weights[0][bad].any()
+    assert found.weights[0][~bad].mean() > 0.98
+    assert np.abs(found.x - clean.x).max() < 2.0
+    assert np.abs(smooth(spoilt).x - clean.x).max() > 10.0
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.6])
+def test_a_node_on_either_side_of_a_track_is_found_or_the_doubt_is_reported(bend):
+    """Ranges to a node of unknown position, started on the wrong side: a bent track decides, a straight one cannot."""
+    rng = np.random.default_rng(3)
+    poses, d = 40, 2
+    along = np.arange(poses) * 10.0
+    truth = np.stack([along, bend * 150 * np.sin(along / 120)], -1)
+    node = np.array([180.0, 120.0])
+    idx = np.arange(poses * d).reshape(poses, d)
+    z = np.diff(truth, axis=0) + rng.normal(size=(poses - 1, 2)) * 0.1
+    reference = np.concatenate([np.concatenate([truth[:1], truth[0] + np.cumsum(z, 0)]).ravel(), [180.0, -120.0]])
+    R = np.tile(0.01 * np.eye(2), (poses - 1, 1, 1))
+    there = np.array([poses * d, poses * d + 1])
+    value = np.linalg.norm(truth - node, axis=1) + rng.normal(size=poses)
+    graph = Graph(
+        reference,
+        poses * d,
+        (
+            increments(idx[:-1], idx[1:], z, R, reference),
+            priors(idx[:1], truth[:1], 0.01 * np.eye(2)[None], reference),
+            priors(there[None], np.array([[180.0, -20.0]]), 1e6 * np.eye(2)[None], reference),
+        ),
+        ranges=(Ranges(idx, np.tile(there, (poses, 1)), value, np.ones(poses)),),
+    )
+    alone = smooth(graph)
+    assert np.linalg.norm(alone.x[there] - node) > 40
+    judged = likeliest(graph, starts(graph, [there], reference))
+    if bend:
+        assert np.linalg.norm(judged.solution.x[there] - node) < 3.0 and judged.rival_m is None
+    else:
+        assert judged.rival_m is not None and abs(judged.rival_m - 240) < 20
+
+
+def test_what_nothing_determines_is_an_error_that_says_so():
+    graph, _ = random_graph(np.random.default_rng(0))
+    with pytest.raises(NotPositiveDefinite):
+        smooth(replace(graph, gaussians=graph.gaussians[1:], ranges=()))
+
+
+def test_an_incremental_solution_ends_where_the_batch_does():
+    """The same two-vehicle graph, with a node of uncertain position in the border, fed pose by pose."""
+    rng = np.random.default_rng(9)
+    graph, facts = random_graph(rng, vehicles=2, poses=80, beacon=True)
+    growing = Growing(facts["beacon"])
+    beacon = np.array([BORDER, BORDER + 1])
+    growing.set(("beacon",), beacon, np.eye(2) / 25.0, np.zeros(2))
+    for k in range(160):
+        idx = growing.append(graph.reference[2 * k : 2 * k + 2])
+        for n, (i, z, R) in enumerate(facts["priors"]):
+            if i == k:
+                L = np.linalg.inv(R)
+                growing.set(("prior", n), idx, L, L @ growing.displacement(idx, z))
+        for i, j, z, R in facts["odometry"]:
+            if j == k:
+                both = np.concatenate([np.arange(2) + 2 * i, idx])
+                made = increments(both[None, :2], both[None, 2:], z[None], R[None], growing.reference)
+                growing.set(("odometry", k), both, made.matrix[0], made.vector[0])
+        for i, j, value, sigma in facts["ranges"]:
+            if i == k:
+                growing.add_range(idx, beacon if j == 160 else np.arange(2) + 2 * j, value, sigma)
+        growing.solve()
+    batch = smooth(graph)
+    latest = np.arange(316, 320)
+    np.testing.assert_allclose(growing.values(latest), batch.x[latest], atol=0.05)
+    np.testing.assert_allclose(growing.values(beacon), batch.x[320:], atol=0.05)
+    wanted = batch.inverse().blocks(latest[None])[0]
+    np.testing.assert_allclose(growing.covariance(latest), wanted, rtol=0.02, atol=0.02 * np.abs(wanted).max())
