@@ -195,6 +195,8 @@ class Jobs:
             raise
         except Exception as error:
             log.exception("job %s failed", job.id, exc_info=error)
+            # Other shards may still be telling; nothing may be recorded after the final state.
+            self._running.pop(job.id, None)
             await self.journal.flush()
             await asyncio.to_thread(self.store.change, job.id, state="failed", finished_at=now(), error=_told(error))
             self.journal.wake()
