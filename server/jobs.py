@@ -110,6 +110,8 @@ class Jobs:
         found = self.find(id)
         if found.state in FINAL:
             return found
+        # Shards may still be telling; nothing may be recorded after the final state.
+        self._running.pop(id, None)
         await self.journal.flush()
         changed = await asyncio.to_thread(self.store.change, id, state="cancelled", finished_at=now())
         self.journal.wake()
@@ -143,8 +145,8 @@ class Jobs:
             raise Refusal(409, "not-done", f"the job is {job.state}; it has no result")
         return self._folder / job.id / name
 
-    def view(self, id: str) -> str:
-        """The view as JSON text: the finished one, or of what there is so far; Refusal 409 before anything."""
+    def view(self, id: str) -> str | None:
+        """The view as JSON text: the finished one, or of what there is so far; None before anything."""
         job = self.find(id)
         finished = self._folder / job.id / VIEW
         if job.state == "done":
@@ -152,7 +154,7 @@ class Jobs:
         parts = self._parts(job)
         outline = self.outline(id)
         if outline is None or not parts:
-            raise Refusal(409, "not-yet", f"the job is {job.state}; there is nothing to see yet")
+            return None
         return dumps(view.build(outline, parts, job.algorithms))
 
     def outline(self, id: str) -> dict[str, Any] | None:

@@ -105,8 +105,12 @@ def job_report(id: str, here: Here) -> HTMLResponse:
 
 @router.get("/jobs/{id}/view")
 def view(id: str, here: Here) -> Response:
-    """A run thinned for display, as far as it has come."""
-    return Response(here.jobs.view(id), media_type="application/json", headers={"cache-control": "no-store"})
+    """A run thinned for display, as far as it has come; 204 while there is nothing to see."""
+    headers = {"cache-control": "no-store"}
+    text = here.jobs.view(id)
+    if text is None:
+        return Response(status_code=204, headers=headers)
+    return Response(text, media_type="application/json", headers=headers)
 
 
 def _wanted(body: Submission, here: Site) -> ScenarioBase:

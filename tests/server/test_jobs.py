@@ -78,6 +78,7 @@ def test_a_cancelled_job_ends_and_frees_the_workers(live: Live):
     assert live.job(id)["state"] == "cancelled"
     assert live.http.get(f"/api/jobs/{id}/result").status_code == 409
     assert not list((live.settings.data / "jobs" / id).glob("shard-*"))
+    assert live.http.get(f"/api/jobs/{id}/view").status_code == 204, "its parts are gone: nothing to see"
 
 
 def test_a_finished_job_cannot_be_cancelled_but_deleted(live: Live):
