@@ -1,0 +1,156 @@
+"""A synthetic array of one moving hydrophone: forward to the beacon, backward to an element (C19 sections 4.4.1-2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from engine.acoustics.beamformer import Correlations, azimuths, correlate, look_delays
+from engine.acoustics.cautions import aperture_m
+from engine.acoustics.density import draw, floored
+from engine.acoustics.sonar import Sonar
+from engine.acoustics.zoom import zoom_transform
+
+#: How far beyond the aperture elements may turn out to be apart, m: the reach of the tabulated correlations.
+SLACK_M = 12.0
+#: Quantile below which power and correlation are taken for noise (C19: 0.6 to 0.8).
+FLOOR = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class SyntheticArray:
+    """What m records tell of a beacon and of the elements' positions, whatever these turn out to be.
+
+    envelope (m, W) complex output of the matched filter over the range window ranges_m (W,); outside of the window
+    there is nothing that several records agree on. focus_m is the range the beam is focused on.
+    """
+
+    sonar: Sonar
+    correlations: Correlations
+    envelope: np.ndarray
+    ranges_m: np.ndarray
+    focus_m: float
+    floor: float = FLOOR
+
+    @property
+    def elements(self) -> int:
+        """Number of elements m."""
+        return len(self.envelope)
+
+    def power(self, positions: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+        """Beam power (N, A) over look angles (A,) from the centre of elements at (N, m, 2) (C19 eq. 4.114)."""
+        delays = look_delays(positions - _centre(positions), azimuth, self.sonar.sound_speed_mps, self.focus_m)
+        return self.correlations.power(delays)
+
+    def bearing_density(self, positions: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+        """Density (N, A) over look angles: the power above its quantile floor (C19 eq. 4.115, Algorithm 2)."""
+        return floored(self.power(positions, azimuth), self.floor)
+
+    def sample_beacon(self, positions: np.ndarray, rng: np.random.Generator, looks: int = 180) -> np.ndarray:
+        """One beacon position (N, 2) for each set of element positions (N, m, 2): forward (C19 eq. 4.116-4.119).
+
+        The bearing is drawn from the beam, the range from the output of the filter summed over elements along it.
+        """
+        centre = _centre(positions)
+        theta = 2 * np.pi / looks * draw(self.bearing_density(positions, azimuths(looks)), rng)
+        u = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+        r = self._range_at(draw(floored(self.power_along(positions, u), self.floor), rng))
+        return centre[:, 0] + r[:, None] * u
+
+    def power_along(self, positions: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Power (N, W) of the elements' summed filter output for a beacon at ranges_m from the centre along (N, 2)."""
+        beacon = _centre(positions) + self.ranges_m[:, None] * direction[:, None, :]
+        return self.evidence(positions[:, None], beacon)
+
+    def evidence(self, positions: np.ndarray, beacon: np.ndarray) -> np.ndarray:
+        """Power (...,) of the filter output summed over elements (..., m, 2) at their ranges from a beacon (..., 2).
+
+        Between 0 and 1: 1 where all elements' strongest outputs add up in phase.
+        """
+        total = 0.0
+        for i in range(self.elements):
+            apart = beacon - positions[..., i, :]
+            total = total + self._output(i, np.sqrt((apart**2).sum(-1)))
+        return np.abs(total) ** 2 / np.abs(self.envelope).max(-1).sum() ** 2
+
+    def leave_one_out(self, beacon: np.ndarray, positions: np.ndarray, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """Correlation of element i with the others (C19 eq. 4.124): ranges (G,) from the beacon, m, and (N, G).
+
+        beacon (N, 2); positions (N, m, 2), of which element i's is not looked at.
+        """
+        apart = beacon[:, None] - positions
+        others = np.sqrt((apart**2).sum(-1)) / self.sonar.sound_speed_mps
+        lag = self.ranges_m / self.sonar.sound_speed_mps
+        return self.ranges_m, self.correlations.leave_one_out(i, lag[None], others)
+
+    def range_density(self, beacon: np.ndarray, positions: np.ndarray, i: int) -> np.ndarray:
+        """Density (N, W) over ranges_m of element i from the beacon: correlation with the others, times its own output.
+
+        Where the others contradict the record wherever there is any output, the record alone counts.
+        """
+        _, correlation = self.leave_one_out(beacon, positions, i)
+        own = floored(np.abs(self.envelope[i]), self.floor)
+        both = floored(correlation, self.floor) * own
+        total = both.sum(-1, keepdims=True)
+        return np.where(total > 0, both / np.where(total > 0, total, 1.0), own)
+
+    def sample_range(self, beacon: np.ndarray, positions: np.ndarray, i: int, rng: np.random.Generator) -> np.ndarray:
+        """One range (N,) of element i from each beacon (N, 2), given the other elements: backward (C19 Algorithm 6).
+
+        Across the line of sight the sonar says nothing of an element (C19 Fig. 4-36): only its range is drawn.
+        """
+        return self._range_at(draw(self.range_density(beacon, positions, i), rng))
+
+    def _range_at(self, bin_: np.ndarray) -> np.ndarray:
+        return self.ranges_m[0] + bin_ * (self.ranges_m[1] - self.ranges_m[0])
+
+    def _output(self, i: int, range_m: np.ndarray) -> np.ndarray:
+        place = (range_m - self.ranges_m[0]) / (self.ranges_m[1] - self.ranges_m[0])
+        last = self.envelope.shape[1] - 1
+        k = np.clip(place.astype(np.int64), 0, last - 1)
+        x = place - k
+        inside = (place >= 0) & (place <= last)
+        return np.where(inside, self.envelope[i][k] * (1 - x) + self.envelope[i][k + 1] * x, 0.0)
+
+
+def _centre(positions: np.ndarray) -> np.ndarray:
+    return positions.mean(-2, keepdims=True)
+
+
+def agreed_window(filtered: np.ndarray, reach_samples: int) -> np.ndarray:
+    """Mask (n,) of the delays around which several filtered records (m, n) have their strongest outputs.
+
+    A source at any bearing is within reach_samples of the same delay in all records: the mean over records of the
+    largest output within that reach stands out there, as it does not for the outputs that noise throws up anywhere.
+    """
+    strongest = maximum_filter1d(np.abs(filtered), 2 * reach_samples + 1, axis=-1).mean(0)
+    level = np.median(strongest)
+    return strongest >= level + 0.5 * (strongest.max() - level)
+
+
+def synthesize(filtered: np.ndarray, positions: np.ndarray, sonar: Sonar, floor: float = FLOOR) -> SyntheticArray:
+    """The synthetic array of filtered records (m, n), complex, at elements roughly at positions (m, 2).
+
+    The positions only say how far apart elements may be; the array is then asked about any others.
+    Raises ValueError for fewer than two records.
+    """
+    if len(filtered) < 2 or len(filtered) != len(positions):
+        raise ValueError(f"{len(filtered)} records at {len(positions)} positions: an array has two or more, one each")
+    reach_m = 2 * float(aperture_m(positions)) + SLACK_M
+    mask = agreed_window(filtered, int(reach_m / 2 / sonar.metres_per_sample))
+    inside = np.flatnonzero(mask)
+    window = slice(inside[0], inside[-1] + 1)
+    gated = np.where(mask, filtered, 0.0)
+    correlations = correlate(zoom_transform(np.real(gated), sonar), sonar, reach_m / sonar.sound_speed_mps)
+    ranges = sonar.ranges_m[window]
+    centre = np.abs(gated).sum(0)[window]
+    return SyntheticArray(
+        sonar,
+        correlations,
+        gated[:, window].astype(np.complex64),
+        ranges,
+        float(ranges[centre.argmax()]),
+        floor,
+    )
