@@ -93,17 +93,6 @@ class Correlations:
             total += 2.0 * self.at(i, j, delays[..., i, :] - delays[..., j, :])
         return total
 
-    def leave_one_out(self, i: int, lag_s: np.ndarray, delays: np.ndarray) -> np.ndarray:
-        """Correlation (..., G) of element i, delayed by lag_s (..., G), with the others' sum, delayed by (..., m).
-
-        What is left of eq. 4.124's power when all that does not depend on the left-out element is dropped.
-        """
-        total = np.zeros(np.broadcast_shapes(lag_s.shape, (*delays.shape[:-1], 1)))
-        for j in range(self.elements):
-            if j != i:
-                total += self.at(i, j, lag_s - delays[..., j, None])
-        return total
-
 
 def correlate(spectra: np.ndarray, sonar: Sonar, reach_s: float) -> Correlations:
     """Tabulate the cross-correlations of element spectra (m, K), as of `zoom_transform`, to lags of reach_s."""

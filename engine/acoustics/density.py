@@ -19,14 +19,27 @@ def floored(weight: np.ndarray, floor: float) -> np.ndarray:
     return np.where(flat, 1.0 / n, excess / np.where(flat, 1.0, total))
 
 
-def draw(density: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """One bin position of each density (..., n): (...,), continuous, bin k reaching from k - 1/2 to k + 1/2.
+def likely(log_likelihood: np.ndarray) -> np.ndarray:
+    """Weights (..., n) of log likelihoods (..., n), the largest of each row 1 (C19 eq. 4.26)."""
+    return np.exp(log_likelihood - log_likelihood.max(-1, keepdims=True))
+
+
+def noise_power(filtered: np.ndarray) -> np.ndarray:
+    """Mean square (...,) of the noise in the complex output of matched filters (..., n), by its median.
+
+    Few delays have a signal, so the median is the noise's: ln 2 times its mean square.
+    """
+    return np.median(np.abs(filtered) ** 2, axis=-1) / np.log(2)
+
+
+def draw(density: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Bin position of each density (..., n) at quantile u (...,) in [0, 1): (...,), bin k from k - 1/2 to k + 1/2.
 
     Inverts the piecewise linear distribution function, so that a million draws need no alias tables of a million
     densities that are each drawn from once.
     """
     cumulative = np.cumsum(density, axis=-1)
-    u = rng.random(density.shape[:-1]) * cumulative[..., -1]
+    u = u * cumulative[..., -1]
     k = np.minimum((cumulative <= u[..., None]).sum(-1), density.shape[-1] - 1)
     upper = np.take_along_axis(cumulative, k[..., None], -1)[..., 0]
     mass = np.take_along_axis(density, k[..., None], -1)[..., 0]

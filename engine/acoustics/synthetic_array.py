@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter1d
 
 from engine.acoustics.beamformer import Correlations, azimuths, correlate, look_delays
 from engine.acoustics.cautions import aperture_m
-from engine.acoustics.density import draw, floored
+from engine.acoustics.density import draw, floored, likely, noise_power
 from engine.acoustics.sonar import Sonar
 from engine.acoustics.zoom import zoom_transform
 
@@ -17,14 +17,21 @@ from engine.acoustics.zoom import zoom_transform
 SLACK_M = 12.0
 #: Quantile below which power and correlation are taken for noise (C19: 0.6 to 0.8).
 FLOOR = 0.8
+#: The most that an array may say for one place against another, as a log likelihood ratio. Loud records would say
+#: more, but echoes and bent wave fronts, which no likelihood of noise knows, grow with them.
+MOST_NATS = 30.0
+#: How far below its best place an array can put any other: the chance left to what all records misheard alike.
+DOUBT_NATS = 12.0
 
 
 @dataclass(frozen=True, eq=False)
 class SyntheticArray:
     """What m records tell of a beacon and of the elements' positions, whatever these turn out to be.
 
-    envelope (m, W) complex output of the matched filter over the range window ranges_m (W,); outside of the window
-    there is nothing that several records agree on. focus_m is the range the beam is focused on.
+    envelope (m, W) complex output of the matched filter over the range window ranges_m (W,), divided by the root mean
+    square of its noise; outside of the window there is nothing that several records agree on. focus_m is the range
+    the beam is focused on. Log likelihoods are those of a known signal in noise (C19 eq. 4.26), its amplitude and
+    phase estimated, times `temper`.
     """
 
     sonar: Sonar
@@ -32,6 +39,7 @@ class SyntheticArray:
     envelope: np.ndarray
     ranges_m: np.ndarray
     focus_m: float
+    temper: float
     floor: float = FLOOR
 
     @property
@@ -40,68 +48,89 @@ class SyntheticArray:
         return len(self.envelope)
 
     def power(self, positions: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-        """Beam power (N, A) over look angles (A,) from the centre of elements at (N, m, 2) (C19 eq. 4.114)."""
+        """Beam power (N, A) over look angles (A,) from the centre of elements at (N, m, 2) (C19 eq. 4.114).
+
+        In units of one element's noise power, the mean over the band's independent bins summed over them.
+        """
         delays = look_delays(positions - _centre(positions), azimuth, self.sonar.sound_speed_mps, self.focus_m)
         return self.correlations.power(delays)
 
     def bearing_density(self, positions: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-        """Density (N, A) over look angles: the power above its quantile floor (C19 eq. 4.115, Algorithm 2)."""
-        return floored(self.power(positions, azimuth), self.floor)
+        """Density (N, A) over look angles, above its quantile floor (C19 eq. 4.115, Algorithm 2).
 
-    def sample_beacon(self, positions: np.ndarray, rng: np.random.Generator, looks: int = 180) -> np.ndarray:
+        The likelihood of an unknown sound from there, which is the exponential of the power: the power itself, as
+        (4.115) has it, leaves most samples on the noise between the beams.
+        """
+        return floored(likely(self.temper / self.elements * self.power(positions, azimuth)), self.floor)
+
+    def sample_beacon(
+        self, positions: np.ndarray, rng: np.random.Generator, strata: np.ndarray | None = None, looks: int = 360
+    ) -> np.ndarray:
         """One beacon position (N, 2) for each set of element positions (N, m, 2): forward (C19 eq. 4.116-4.119).
 
-        The bearing is drawn from the beam, the range from the output of the filter summed over elements along it.
+        The bearing is drawn from the beam, at its quantiles `strata` (N,) where given, and the range from the output
+        of the filter summed over the elements along it.
         """
-        centre = _centre(positions)
-        theta = 2 * np.pi / looks * draw(self.bearing_density(positions, azimuths(looks)), rng)
+        quantile = rng.random(len(positions)) if strata is None else strata
+        theta = 2 * np.pi / looks * draw(self.bearing_density(positions, azimuths(looks)), quantile)
         u = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
-        r = self._range_at(draw(floored(self.power_along(positions, u), self.floor), rng))
-        return centre[:, 0] + r[:, None] * u
+        weight = likely(self.temper / self.elements * self.power_along(positions, u))
+        r = self._range_at(draw(floored(weight, self.floor), rng.random(len(positions))))
+        return _centre(positions)[:, 0] + r[:, None] * u
 
     def power_along(self, positions: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Power (N, W) of the elements' summed filter output for a beacon at ranges_m from the centre along (N, 2)."""
         beacon = _centre(positions) + self.ranges_m[:, None] * direction[:, None, :]
-        return self.evidence(positions[:, None], beacon)
+        return self.focused_power(positions[:, None], beacon)
 
-    def evidence(self, positions: np.ndarray, beacon: np.ndarray) -> np.ndarray:
+    def focused_power(self, positions: np.ndarray, beacon: np.ndarray) -> np.ndarray:
         """Power (...,) of the filter output summed over elements (..., m, 2) at their ranges from a beacon (..., 2).
 
-        Between 0 and 1: 1 where all elements' strongest outputs add up in phase.
+        In units of one element's noise power; the beam's power where it is focused, without what comes elsewhere.
         """
-        total = 0.0
+        total: np.ndarray | float = 0.0
         for i in range(self.elements):
             apart = beacon - positions[..., i, :]
             total = total + self._output(i, np.sqrt((apart**2).sum(-1)))
-        return np.abs(total) ** 2 / np.abs(self.envelope).max(-1).sum() ** 2
+        return np.abs(total) ** 2
 
-    def leave_one_out(self, beacon: np.ndarray, positions: np.ndarray, i: int) -> tuple[np.ndarray, np.ndarray]:
-        """Correlation of element i with the others (C19 eq. 4.124): ranges (G,) from the beacon, m, and (N, G).
+    def log_likelihood(self, positions: np.ndarray, beacon: np.ndarray) -> np.ndarray:
+        """Of elements at (..., m, 2) and a beacon at (..., 2) together: (...,), at most 0, never below -DOUBT_NATS."""
+        most = np.abs(self.envelope).max(-1).sum() ** 2
+        below = self.temper / self.elements * (self.focused_power(positions, beacon) - most)
+        return np.logaddexp(below, -DOUBT_NATS) - np.log1p(np.exp(-DOUBT_NATS))
 
-        beacon (N, 2); positions (N, m, 2), of which element i's is not looked at.
+    def leave_one_out(self, beacon: np.ndarray, positions: np.ndarray, i: int) -> np.ndarray:
+        """Power (N, W) of the others' summed output plus element i's as if at ranges_m from the beacon (C19 eq. 4.124).
+
+        beacon (N, 2); positions (N, m, 2), of which element i's is not looked at. Algorithm 6 on the filter's output
+        where the beacon's sound arrives, instead of on all of the records.
         """
-        apart = beacon[:, None] - positions
-        others = np.sqrt((apart**2).sum(-1)) / self.sonar.sound_speed_mps
-        lag = self.ranges_m / self.sonar.sound_speed_mps
-        return self.ranges_m, self.correlations.leave_one_out(i, lag[None], others)
+        others = np.zeros(len(beacon), dtype=self.envelope.dtype)
+        for j in range(self.elements):
+            if j != i:
+                others += self._output(j, np.linalg.norm(beacon - positions[:, j], axis=-1))
+        return np.abs(others[:, None] + self.envelope[i]) ** 2
 
     def range_density(self, beacon: np.ndarray, positions: np.ndarray, i: int) -> np.ndarray:
-        """Density (N, W) over ranges_m of element i from the beacon: correlation with the others, times its own output.
+        """Density (N, W) over ranges_m of element i from the beacon, above its quantile floor: `leave_one_out`'s."""
+        power = self.leave_one_out(beacon, positions, i)
+        return floored(likely(self.temper / self.elements * power), self.floor)
 
-        Where the others contradict the record wherever there is any output, the record alone counts.
-        """
-        _, correlation = self.leave_one_out(beacon, positions, i)
-        own = floored(np.abs(self.envelope[i]), self.floor)
-        both = floored(correlation, self.floor) * own
-        total = both.sum(-1, keepdims=True)
-        return np.where(total > 0, both / np.where(total > 0, total, 1.0), own)
-
-    def sample_range(self, beacon: np.ndarray, positions: np.ndarray, i: int, rng: np.random.Generator) -> np.ndarray:
+    def sample_range(
+        self,
+        beacon: np.ndarray,
+        positions: np.ndarray,
+        i: int,
+        rng: np.random.Generator,
+        strata: np.ndarray | None = None,
+    ) -> np.ndarray:
         """One range (N,) of element i from each beacon (N, 2), given the other elements: backward (C19 Algorithm 6).
 
         Across the line of sight the sonar says nothing of an element (C19 Fig. 4-36): only its range is drawn.
         """
-        return self._range_at(draw(self.range_density(beacon, positions, i), rng))
+        quantile = rng.random(len(beacon)) if strata is None else strata
+        return self._range_at(draw(self.range_density(beacon, positions, i), quantile))
 
     def _range_at(self, bin_: np.ndarray) -> np.ndarray:
         return self.ranges_m[0] + bin_ * (self.ranges_m[1] - self.ranges_m[0])
@@ -142,15 +171,17 @@ def synthesize(filtered: np.ndarray, positions: np.ndarray, sonar: Sonar, floor:
     mask = agreed_window(filtered, int(reach_m / 2 / sonar.metres_per_sample))
     inside = np.flatnonzero(mask)
     window = slice(inside[0], inside[-1] + 1)
-    gated = np.where(mask, filtered, 0.0)
-    correlations = correlate(zoom_transform(np.real(gated), sonar), sonar, reach_m / sonar.sound_speed_mps)
+    gated = np.where(mask, filtered / np.sqrt(noise_power(filtered)).mean(), 0.0)
+    band = (sonar.high_hz - sonar.low_hz) / sonar.sampling_hz
+    correlations = correlate(2 * band * zoom_transform(np.real(gated), sonar), sonar, reach_m / sonar.sound_speed_mps)
     ranges = sonar.ranges_m[window]
-    centre = np.abs(gated).sum(0)[window]
+    loudest = np.abs(gated).max(-1).sum() ** 2 / len(gated)
     return SyntheticArray(
         sonar,
         correlations,
         gated[:, window].astype(np.complex64),
         ranges,
-        float(ranges[centre.argmax()]),
+        float(ranges[np.abs(gated).sum(0)[window].argmax()]),
+        min(1.0, MOST_NATS / loudest),
         floor,
     )
