@@ -1,0 +1,210 @@
+"""Sum-product on the Bayes tree, for all kernels at once (C19 eqs. 4.93-4.95).
+
+A kernel is one joint value of the ambiguous variables (beacons). Given it, every factor is linearized at that
+kernel's own point, so that a clique's density over its remaining variables is Gaussian and a message is an
+information matrix, vector and constant over the separator *jointly*. Nothing is smoothed between messages, hence no
+excess of variance can pile up along a chain; what is non-Gaussian lives in the kernels and in their linearizations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import count
+
+import numpy as np
+
+from engine.slam.bayes_tree import BayesTree
+from engine.slam.graph import Graph
+
+
+@dataclass(frozen=True)
+class Message:
+    """A clique's density over its separator: exp(const - d' Lam d / 2 + eta' d), d the distance from the points.
+
+    Lam (1 or N, D, D), eta (1 or N, D), const (1 or N,): one where it is the same for all kernels.
+    """
+
+    number: int
+    Lam: np.ndarray
+    eta: np.ndarray
+    const: np.ndarray
+
+
+@dataclass(frozen=True)
+class Conditional:
+    """[frontals | separator]: mean m - G d_separator and covariance half half', shapes as in Message."""
+
+    m: np.ndarray
+    G: np.ndarray
+    half: np.ndarray
+
+
+@dataclass
+class Points:
+    """Where factors are linearized: values {variable: (1 or N, d)}, and a version that changes with each."""
+
+    values: dict[str, np.ndarray] = field(default_factory=dict)
+    versions: dict[str, int] = field(default_factory=dict)
+    _counter: count = field(default_factory=lambda: count(1))
+
+    def set(self, variable: str, value: np.ndarray) -> None:
+        self.values[variable] = value
+        self.versions[variable] = next(self._counter)
+
+    def take(self, kept: np.ndarray) -> None:
+        """Keep these kernels (N,), numbers that may repeat; points shared by all stay as they are."""
+        for variable, value in self.values.items():
+            if len(value) > 1:
+                self.set(variable, value[kept])
+
+
+@dataclass(frozen=True)
+class Up:
+    """An up-pass: the conditionals by clique, the log evidence (1 or N,), and how many cliques were reused."""
+
+    conditionals: list[Conditional]
+    log_evidence: np.ndarray
+    reused: int
+
+
+class Propagation:
+    """Passes messages over a tree; a clique whose factors, points and incoming messages stayed is not done again."""
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple, tuple[Conditional, Message]] = {}
+        self._numbers = count()
+
+    def up(self, graph: Graph, tree: BayesTree, points: Points, given: frozenset[str]) -> Up:
+        """From the leaves to the roots, with the variables `given` (the kernels' own) held at their points."""
+        homes: list[list[int]] = [[] for _ in tree.cliques]
+        depth = _depths(tree)
+        evidence: np.ndarray = np.zeros(1)
+        for number, factor in enumerate(graph.factors):
+            free = [v for v in factor.variables if v not in given]
+            if free:
+                homes[max((tree.home[v] for v in free), key=depth.__getitem__)].append(number)
+            else:
+                evidence = evidence + factor.log_density(*(points.values[v] for v in factor.variables))
+        conditionals: list[Conditional] = [None] * len(tree.cliques)  # type: ignore[list-item]
+        incoming: list[list[tuple[tuple[str, ...], Message]]] = [[] for _ in tree.cliques]
+        kept: dict[tuple, tuple[Conditional, Message]] = {}
+        reused = 0
+        for i in reversed(range(len(tree.cliques))):
+            clique = tree.cliques[i]
+            frontals = [v for v in clique.frontals if v not in given]
+            if not frontals:
+                continue
+            separator = tuple(v for v in clique.separator if v not in given)
+            touched = sorted({v for f in homes[i] for v in graph.factors[f].variables} | set(clique.variables) - given)
+            key = (
+                tuple(frontals),
+                separator,
+                tuple(homes[i]),
+                tuple(m.number for _, m in incoming[i]),
+                tuple((v, points.versions[v]) for v in touched),
+            )
+            found = self._kept.get(key)
+            reused += found is not None
+            if found is None:
+                found = self._eliminate(graph, frontals, separator, homes[i], incoming[i], points, given)
+            kept[key] = found
+            conditionals[i], message = found
+            if separator:
+                assert clique.parent is not None
+                incoming[clique.parent].append((separator, message))
+            else:
+                evidence = evidence + message.const
+        self._kept = kept
+        return Up(conditionals, evidence, reused)
+
+    def _eliminate(
+        self,
+        graph: Graph,
+        frontals: list[str],
+        separator: tuple[str, ...],
+        factors: list[int],
+        incoming: list[tuple[tuple[str, ...], Message]],
+        points: Points,
+        given: frozenset[str],
+    ) -> tuple[Conditional, Message]:
+        at, D = {}, 0
+        for v in (*frontals, *separator):
+            at[v] = slice(D, D + graph.kinds[v].dim)
+            D = at[v].stop
+        F = at[frontals[-1]].stop
+        pieces = []
+        const: np.ndarray = np.zeros(1)
+        for number in factors:
+            factor = graph.factors[number]
+            e, J = factor.linearize(*(points.values[v] for v in factor.variables))
+            const = const - 0.5 * np.square(e).sum(-1)
+            free = [(at[v], Jv) for v, Jv in zip(factor.variables, J, strict=True) if v not in given]
+            pieces.append((e, free))
+        n = max([len(e) for e, _ in pieces] + [len(m.eta) for _, m in incoming], default=1)
+        curved = max(
+            [len(J) for _, free in pieces for _, J in free if J.ndim == 3] + [len(m.Lam) for _, m in incoming],
+            default=1,
+        )
+        Lam, eta = np.zeros((curved, D, D)), np.zeros((n, D))
+        for e, free in pieces:
+            for a, Ja in free:
+                eta[:, a] -= np.einsum("...ki,...k->...i", Ja, e)
+                for b, Jb in free:
+                    Lam[:, a, b] += np.einsum("...ki,...kj->...ij", Ja, Jb)
+        for variables, message in incoming:
+            index = np.concatenate([np.arange(at[v].start, at[v].stop) for v in variables])
+            Lam[:, index[:, None], index] += message.Lam
+            eta[:, index] += message.eta
+            const = const + message.const
+        try:
+            low = np.linalg.cholesky(Lam[:, :F, :F])
+        except np.linalg.LinAlgError:
+            raise ValueError(f"nothing determines {', '.join(frontals)}: give it a prior or odometry") from None
+        inverse_low = np.linalg.inv(low)
+        half = np.swapaxes(inverse_low, -1, -2)
+        cov = half @ inverse_low
+        G = cov @ Lam[:, :F, F:]
+        m = np.einsum("...ij,...j->...i", cov, eta[:, :F])
+        const = const + 0.5 * np.einsum("...i,...i->...", m, eta[:, :F])
+        const = const - np.log(np.diagonal(low, axis1=-2, axis2=-1)).sum(-1)
+        rest = Lam[:, F:, F:] - np.swapaxes(Lam[:, :F, F:], -1, -2) @ G
+        onward = eta[:, F:] - np.einsum("...ji,...j->...i", G, eta[:, :F])
+        message = Message(next(self._numbers), 0.5 * (rest + np.swapaxes(rest, -1, -2)), onward, const)
+        return Conditional(m, G, half), message
+
+
+def down(
+    graph: Graph,
+    tree: BayesTree,
+    up: Up,
+    points: Points,
+    given: frozenset[str],
+    kernels: int,
+    rng: np.random.Generator | None,
+) -> dict[str, np.ndarray]:
+    """From the roots to the leaves: a joint draw of every variable (N, d) for each kernel, or the mean without rng."""
+    away: dict[str, np.ndarray] = {}
+    for i, clique in enumerate(tree.cliques):
+        frontals = [v for v in clique.frontals if v not in given]
+        if not frontals:
+            continue
+        conditional = up.conditionals[i]
+        d = np.broadcast_to(conditional.m, (kernels, conditional.m.shape[-1]))
+        separator = [v for v in clique.separator if v not in given]
+        if separator:
+            known = np.concatenate([away[v] for v in separator], axis=-1)
+            d = d - np.einsum("...ij,...j->...i", conditional.G, known)
+        if rng is not None:
+            d = d + np.einsum("...ij,...j->...i", conditional.half, rng.standard_normal(d.shape))
+        start = 0
+        for v in frontals:
+            away[v] = d[:, start : start + graph.kinds[v].dim]
+            start += graph.kinds[v].dim
+    return {v: points.values[v] + d for v, d in away.items()}
+
+
+def _depths(tree: BayesTree) -> list[int]:
+    depths = []
+    for clique in tree.cliques:
+        depths.append(0 if clique.parent is None else depths[clique.parent] + 1)
+    return depths

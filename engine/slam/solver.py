@@ -1,0 +1,309 @@
+"""Beliefs of all variables of a growing factor graph, by kernels that each hold one joint value of the beacons.
+
+The state of a kernel is a value of every *ambiguous* variable (one that no prior or odometry determines). What the
+other variables are, given it, the Bayes tree says in closed form (propagation.py), and with it how well that value
+explains everything measured: its evidence. When factors arrive, kernels are weighted by what they add to the
+evidence, resampled, and moved by Markov chain steps that leave the posterior as it is: draws towards one beacon from
+the factors on it (batch Gibbs, C19 eq. 4.99), differences between other kernels, and new labels of mixtures. Poses are
+drawn in the end, jointly, from the root down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from engine.slam.bayes_tree import BayesTree, tree
+from engine.slam.elimination import order
+from engine.slam.factors.factor import Factor
+from engine.slam.graph import Graph
+from engine.slam.propagation import Points, Propagation, Up, down
+from engine.slam.variables import LABEL, Kind
+
+#: Candidates per kernel when a beacon is drawn anew, and the most factors that refine them.
+CANDIDATES, REFINERS = 24, 10
+#: Newton steps that refine candidates, and those that settle the poses for a proposed beacon.
+REFINEMENTS, SETTLINGS = 4, 2
+#: Distance (in each coordinate) below which a point of linearization is left where it is.
+SETTLED = 1e-3
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one extension did: cliques of the tree, how many were reused, effective kernels, share of moves taken."""
+
+    cliques: int
+    reused: int
+    effective: float
+    accepted: float
+
+
+class Solver:
+    """Grows a graph and keeps its beliefs; the same seed and extensions give the same kernels."""
+
+    def __init__(self, kernels: int = 100, seed: int | np.random.SeedSequence = 0, sweeps: int = 4) -> None:
+        if kernels < 4:
+            raise ValueError(f"a belief needs at least 4 kernels, got {kernels}")
+        self.kernels, self.sweeps = kernels, sweeps
+        self.graph = Graph()
+        self.tree = BayesTree([], {})
+        self._rng = np.random.default_rng(seed)
+        self._points = Points()
+        self._propagation = Propagation()
+        self._given: frozenset[str] = frozenset()
+        self._evidence = np.zeros(kernels)
+        self._up: Up | None = None
+
+    @property
+    def beacons(self) -> list[str]:
+        """The ambiguous variables that are places, in order of arrival."""
+        return [v for v in self.graph.kinds if v in self._given and self.graph.kinds[v] is not LABEL]
+
+    def extend(self, kinds: dict[str, Kind], factors: Iterable[Factor]) -> Step:
+        """Add variables and factors and bring the beliefs up to date."""
+        added = list(factors)
+        self.graph.add(kinds, added)
+        self._given = frozenset(self.graph.ambiguous())
+        late = self._enter(kinds, added)
+        self._grow(order(list(self.graph.kinds), [f.variables for f in self.graph.factors], self._last(kinds)))
+        before = self._known_evidence(late)
+        self._settle()
+        weights = self._evidence - before
+        weights = np.exp(weights - weights.max())
+        effective = float(weights.sum() ** 2 / np.square(weights).sum())
+        reused = self._up.reused if self._up else 0
+        accepted = 0.0
+        if self._given:
+            self._resample(weights / weights.sum())
+            accepted = float(np.mean([self._sweep() for _ in range(self.sweeps)]))
+        return Step(len(self.tree.cliques), reused, effective, accepted)
+
+    def beliefs(self, variables: Iterable[str] | None = None) -> dict[str, np.ndarray]:
+        """Joint draws (N, d) of these variables, one for each kernel; of all without an argument."""
+        up = self._pass()
+        drawn = down(self.graph, self.tree, up, self._points, self._given, self.kernels, self._rng)
+        found = drawn | {v: self._points.values[v] for v in self._given}
+        return {v: found[v] for v in (variables if variables is not None else self.graph.kinds)}
+
+    def _last(self, kinds: dict[str, Kind]) -> list[str]:
+        """What stays near the root: the newest pose, then the beacons."""
+        newest = [v for v in kinds if v not in self._given][-1:]
+        return newest + [v for v in self.graph.kinds if v in self._given]
+
+    def _grow(self, sequence: list[str]) -> None:
+        self.tree = tree([f.variables for f in self.graph.factors], sequence)
+
+    # -- entering variables
+
+    def _enter(self, kinds: dict[str, Kind], added: list[Factor]) -> list[Factor]:
+        """Give every new variable a first point; the new factors that first points do not already account for."""
+        late, waiting = list(added), list(kinds)
+        strata = (np.arange(self.kernels) + 0.5) / self.kernels
+        while waiting:
+            for v in waiting:
+                source = self._source(v, waiting, added)
+                if source is None:
+                    continue
+                values = [self._points.values.get(u, np.zeros((1, self.graph.kinds[u].dim))) for u in source.variables]
+                if v in self._given:
+                    spread = self._rng.permutation(strata)
+                    late = [f for f in late if f is not source]
+                else:
+                    spread = np.zeros(max([len(x) for x in values], default=1)) if len(source.variables) > 1 else [0.0]
+                self._points.set(v, source.sample(source.variables.index(v), values, np.asarray(spread), self._rng))
+                waiting.remove(v)
+                break
+            else:
+                raise ValueError(f"nothing says where {', '.join(waiting)} might be")
+        return late
+
+    def _source(self, v: str, waiting: list[str], added: list[Factor]) -> Factor | None:
+        """A factor that can draw v from what is known; one that determines it where there is one."""
+        able = [f for f in added if v in f.variables and all(u == v or u not in waiting for u in f.variables)]
+        if self.graph.kinds[v] is LABEL:
+            return next((f for f in added if f.variables[-1] == v), None)
+        if v in self._given:
+            return next(iter(able), None)
+        return next((f for f in able if v in f.determined), None)
+
+    def _known_evidence(self, late: list[Factor]) -> np.ndarray:
+        """The evidence before the late factors, of the graph as it now is."""
+        if not self._given:
+            return self._evidence
+        everything = self.graph.factors
+        self.graph.factors = [f for f in everything if not any(f is g for g in late)]
+        try:
+            self._settle()
+            return self._evidence
+        except ValueError:
+            # Without the late factors something is undetermined; then they cannot be weighed apart.
+            return np.zeros(self.kernels)
+        finally:
+            self.graph.factors = everything
+
+    # -- evidence
+
+    def _pass(self) -> Up:
+        self._up = self._propagation.up(self.graph, self.tree, self._points, self._given)
+        return self._up
+
+    def _curved(self) -> list[str]:
+        """Variables, other than the kernels' own, whose factors depend on where they are linearized."""
+        return list(
+            dict.fromkeys(v for f in self.graph.factors if not f.linear for v in f.variables if v not in self._given)
+        )
+
+    def _settle(self) -> None:
+        """Move the points of linearization to the mode of the poses given each kernel; the evidence there."""
+        curved = self._curved()
+        for _ in range(SETTLINGS):
+            up = self._pass()
+            mean = down(self.graph, self.tree, up, self._points, self._given, self.kernels, None)
+            moved = False
+            for v in curved:
+                if np.abs(mean[v] - self._points.values[v]).max() > SETTLED:
+                    self._points.set(v, mean[v])
+                    moved = True
+            if not moved:
+                break
+        else:
+            up = self._pass()
+        self._evidence = np.broadcast_to(up.log_evidence, (self.kernels,)).copy()
+
+    def _resample(self, weights: np.ndarray) -> None:
+        """Systematic resampling."""
+        aims = (np.arange(self.kernels) + self._rng.random()) / self.kernels
+        kept = np.minimum(np.searchsorted(np.cumsum(weights), aims), self.kernels - 1)
+        self._points.take(kept)
+        self._evidence = self._evidence[kept]
+
+    # -- moves
+
+    def _sweep(self) -> float:
+        taken = []
+        beacons = self.beacons
+        if beacons:
+            taken.append(self._cross(beacons))
+        for beacon in beacons:
+            taken.append(self._redraw(beacon))
+        for label in [v for v in self._given if self.graph.kinds[v] is LABEL]:
+            self._relabel(label)
+        return float(np.mean(taken)) if taken else 1.0
+
+    def _try(self, proposed: dict[str, np.ndarray], odds: Callable[[], np.ndarray] | None = None) -> float:
+        """Propose values; keep each kernel's where its evidence and the odds of the way back (log, N) say so."""
+        old, before = dict(self._points.values), self._evidence
+        for v, value in proposed.items():
+            self._points.set(v, value)
+        self._settle()
+        gain = self._evidence - before
+        if odds is not None:
+            gain = gain + odds()
+        keep = np.log(self._rng.random(self.kernels)) < np.where(np.isfinite(gain), gain, -np.inf)
+        for v, value in self._points.values.items():
+            if value is not old[v]:
+                self._points.set(v, np.where(keep[:, None], value, old[v]))
+        self._evidence = np.where(keep, self._evidence, before)
+        return float(keep.mean())
+
+    def _cross(self, beacons: list[str]) -> float:
+        """Step by the difference of two other kernels, all beacons at once (differential evolution, ter Braak 2006)."""
+        N = self.kernels
+        state = np.concatenate([self._points.values[b] for b in beacons], axis=-1)
+        a, b = self._rng.integers(N, size=N), self._rng.integers(N, size=N)
+        scale = np.where(self._rng.random(N) < 0.2, 1.0, 2.38 / np.sqrt(2 * state.shape[-1]))
+        moved = state + scale[:, None] * (state[a] - state[b]) + 1e-4 * self._rng.standard_normal(state.shape)
+        parts = np.split(moved, np.cumsum([self.graph.kinds[b].dim for b in beacons])[:-1], axis=-1)
+        return self._try(dict(zip(beacons, parts, strict=True)))
+
+    def _relabel(self, label: str) -> None:
+        """Another component, by its odds; the evidence decides."""
+        factor = next(f for f in self.graph.factors if f.variables[-1] == label)
+        values = [self._points.values[v] for v in factor.variables]
+        drawn = factor.sample(len(values) - 1, values, self._rng.random(self.kernels), self._rng)
+        self._try({label: drawn})
+
+    def _redraw(self, beacon: str) -> float:
+        """Draw a beacon from kernels around the places that the factors on it, given the poses, agree on."""
+        factors = [self.graph.factors[i] for i in self.graph.of(beacon)]
+        source = factors[self._rng.integers(len(factors))]
+        if len(factors) > REFINERS:
+            factors = [factors[i] for i in self._rng.choice(len(factors), REFINERS, replace=False)]
+        seed = int(self._rng.integers(2**32))
+
+        def around() -> _Around:
+            return _Around(beacon, source, factors, self._points, self.kernels, np.random.default_rng(seed))
+
+        now = around()
+        proposed = now.draw(self._rng)
+        current = self._points.values[beacon]
+        there = now.log_density(proposed)
+        return self._try({beacon: proposed}, lambda: around().log_density(current) - there)
+
+
+class _Around:
+    """For each kernel a mixture of Gaussians over a beacon's place, about refined draws of one factor.
+
+    Its widths come from the factors' information there, bounded by the draws' own spacing; sources and noise are
+    the same whenever it is made with the same seed, so that it can be evaluated for the way back.
+    """
+
+    def __init__(
+        self,
+        beacon: str,
+        source: Factor,
+        factors: list[Factor],
+        points: Points,
+        kernels: int,
+        rng: np.random.Generator,
+    ) -> None:
+        M = CANDIDATES
+        strata = (np.arange(M) + rng.random((kernels, 1))) / M
+        others = {v: points.values[v][:, None] for f in (source, *factors) for v in f.variables if v != beacon}
+
+        def values(f: Factor, at: np.ndarray) -> list[np.ndarray]:
+            size = at.shape[:-1]
+            return [
+                at if v == beacon else np.broadcast_to(others[v], (*size, others[v].shape[-1])) for v in f.variables
+            ]
+
+        where = source.variables.index(beacon)
+        blank = np.zeros((kernels, M, points.values[beacon].shape[-1]))
+        at = source.sample(where, values(source, blank), strata, rng)
+        apart = np.sqrt(np.square(np.roll(at, 1, axis=1) - at).sum(-1)).mean(-1)[:, None, None, None]
+        slack = np.eye(at.shape[-1]) / np.square(np.maximum(apart, 1e-6))
+        log = np.zeros(at.shape[:-1])
+        P = np.broadcast_to(slack, (*at.shape, at.shape[-1]))
+        for step in range(REFINEMENTS + 1):
+            Lam, eta = np.zeros((*at.shape, at.shape[-1])), np.zeros(at.shape)
+            log = np.zeros(at.shape[:-1])
+            for f in factors:
+                e, J = f.linearize(*values(f, at))
+                Jb = J[f.variables.index(beacon)]
+                Lam = Lam + np.einsum("...ki,...kj->...ij", Jb, Jb)
+                eta = eta - np.einsum("...ki,...k->...i", Jb, e)
+                log = log - 0.5 * np.square(e).sum(-1)
+            P = Lam + slack
+            if step < REFINEMENTS:
+                at = at + np.linalg.solve(P, eta[..., None])[..., 0]
+        self._mean, self._P = at, P
+        self._log_det = 0.5 * np.linalg.slogdet(P)[1]
+        log = log - self._log_det
+        log = log - log.max(-1, keepdims=True)
+        # A little of every candidate: modes the poses of today speak against must stay within reach.
+        self._weight = 0.9 * np.exp(log) / np.exp(log).sum(-1, keepdims=True) + 0.1 / M
+
+    def draw(self, rng: np.random.Generator) -> np.ndarray:
+        N = len(self._mean)
+        chosen = (np.cumsum(self._weight, axis=1) < rng.random((N, 1))).sum(1).clip(0, self._weight.shape[1] - 1)
+        mean, P = self._mean[np.arange(N), chosen], self._P[np.arange(N), chosen]
+        half = np.linalg.inv(np.linalg.cholesky(P))
+        return mean + np.einsum("nij,ni->nj", half, rng.standard_normal(mean.shape))
+
+    def log_density(self, at: np.ndarray) -> np.ndarray:
+        d = at[:, None] - self._mean
+        z = -0.5 * np.einsum("nmi,nmij,nmj->nm", d, self._P, d) + self._log_det + np.log(self._weight)
+        top = z.max(-1, keepdims=True)
+        return top[:, 0] + np.log(np.exp(z - top).sum(-1))
