@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import get_lapack_funcs, solve_triangular
 
-from engine.smoothing.band import BandInverse, Factor, NotPositiveDefinite, System
+from engine.smoothing.band import Factor, NotPositiveDefinite, System
 from engine.smoothing.graph import Betweens, Ranges
 
-dpbtrf, dtbtrs, dpotrf = get_lapack_funcs(("pbtrf", "tbtrs", "potrf"), dtype=np.float64)
+dpbtrf, dpbtrs, dtbtrs, dpotrf = get_lapack_funcs(("pbtrf", "pbtrs", "tbtrs", "potrf"), dtype=np.float64)
 
 #: Gauss-Newton steps after each packet, and the step (m) that ends them sooner.
 STEPS, SETTLED_M = 3, 1e-2
@@ -144,6 +144,7 @@ class Growing:
     def add_between(self, first: np.ndarray, second: np.ndarray, z: np.ndarray, information: np.ndarray) -> None:
         """An SE(2) relation between two poses."""
         self.pose_idx.add(np.concatenate([first, second]))
+        self._touch(np.concatenate([first, second]))
         self.pose_z.add(z)
         self.pose_information.add(information)
         self.pose_matrix.add(np.zeros((6, 6)))
@@ -153,18 +154,23 @@ class Growing:
         """A range between two positions."""
         scale = [] if self.scale is None else [self.scale]
         self.range_idx.add(np.concatenate([receiver, sender, scale]).astype(int))
+        self._touch(np.concatenate([receiver, sender]))
         self.range_z.add(value)
         self.range_sigma.add(sigma)
         k = len(self.range_idx.data[0])
         self.range_matrix.add(np.zeros((k, k)))
         self.range_vector.add(np.zeros(k))
 
+    def _touch(self, idx: np.ndarray) -> None:
+        """Take the factor up again no later than at these unknowns, so that what is new there is linearized."""
+        self.changed = min(self.changed, int(idx.min()))
+
     def solve(self, steps: int = STEPS) -> None:
         """Gauss-Newton steps from the present estimate; NotPositiveDefinite where something is undetermined."""
         self.solves += 1
         whole = self.solves % WHOLE_EVERY == 0
+        p = 0 if whole else max(0, min(self.changed, self.n - TAIL))
         for _ in range(steps):
-            p = 0 if whole else max(0, min(self.changed, self.n - TAIL))
             self._linearize(p)
             p = min(p, self.changed)
             if self._step(p) < SETTLED_M:
@@ -269,5 +275,13 @@ class Growing:
         if (at < 0).any():
             self._step(0)
             return self.covariance(idx)
-        inside = at[at < size]
-        return BandInverse(factor, int(inside.min()) if inside.size else size - 1).blocks(at[None])[0]
+        inside = at < size
+        unit = np.zeros((size, len(at)))
+        unit[at[inside], np.flatnonzero(inside)] = 1.0
+        cov = np.where(inside[:, None], dpbtrs(factor.L, unit, lower=1)[0][np.where(inside, at, 0)], 0.0)
+        if self.m:
+            rows = np.where(inside[:, None], -factor.W[np.where(inside, at, 0)], 0.0)
+            rows[~inside, at[~inside] - size] = 1.0
+            half = solve_triangular(factor.S, rows.T, lower=True)
+            cov += half.T @ half
+        return cov

@@ -118,3 +118,40 @@ def test_an_incremental_solution_ends_where_the_batch_does():
     np.testing.assert_allclose(growing.values(beacon), batch.x[320:], atol=0.05)
     wanted = batch.inverse().blocks(latest[None])[0]
     np.testing.assert_allclose(growing.covariance(latest), wanted, rtol=0.02, atol=0.02 * np.abs(wanted).max())
+
+
+def long_chain(count: int = 80) -> tuple[Growing, np.ndarray]:
+    """A solved incremental chain of SE(2) poses 5 m apart along x, many more unknowns than are solved for each time."""
+    growing = Growing(np.empty(0))
+    information = np.diag([100.0, 100.0, 1e4])
+    poses = [growing.append(np.zeros(3))]
+    growing.set(("start",), poses[0], information, np.zeros(3))
+    for k in range(1, count):
+        poses.append(growing.append(np.array([5.0 * k, 0.0, 0.0])))
+        growing.add_between(poses[-2], poses[-1], np.array([5.0, 0.0, 0.0]), information)
+        growing.solve()
+    return growing, np.array(poses)
+
+
+def test_a_pose_tied_to_one_long_ago_is_determined_at_once():
+    """A sender silent for hundreds of unknowns is heard again: its launch hangs on its last one by odometry alone."""
+    growing, poses = long_chain()
+    idx = growing.append(np.array([3.0, 1.0, 0.2]))
+    growing.add_between(poses[0], idx, np.array([3.0, 1.0, 0.2]), np.diag([4.0, 4.0, 100.0]))
+    growing.solve()
+    np.testing.assert_allclose(growing.values(idx), [3.0, 1.0, 0.2], atol=1e-6)
+    # Covariances of composed relations, W15 eq. (9), with the first pose's own.
+    turned = np.array([[1, 0, -1.0], [0, 1, 3.0], [0, 0, 1]])
+    expected = turned @ np.diag([0.01, 0.01, 1e-4]) @ turned.T + np.diag([0.25, 0.25, 0.01])
+    np.testing.assert_allclose(growing.covariance(idx), expected, rtol=1e-6, atol=1e-9)
+
+
+def test_a_range_to_a_pose_long_ago_counts_at_once():
+    growing, poses = long_chain()
+    before = growing.covariance(poses[-1][:2])
+    distance = float(np.linalg.norm(growing.values(poses[-1])[:2])) + 1.0
+    growing.add_range(poses[-1][:2], poses[0][:2], distance, 0.1)
+    growing.solve()
+    after = growing.covariance(poses[-1][:2])
+    assert after[0, 0] < 0.1 * before[0, 0]
+    assert abs(growing.values(poses[-1])[0] - distance) < 0.2
