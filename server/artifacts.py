@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import platform
@@ -22,14 +23,21 @@ from server.wire import plain
 RESULT, ARRAYS, VERSIONS = "result.json", "arrays.npz", "versions.json"
 
 
-def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write a file so that it is there completely, even after a power cut, or not at all."""
+def sha256(path: Path) -> str:
+    """The checksum of a file, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> str:
+    """Write a file so that it is there completely, even after a power cut, or not at all; its checksum."""
     handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             write(file)
             file.flush()
             os.fsync(file.fileno())
+        digest = sha256(Path(temporary))
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
     except BaseException:
@@ -40,21 +48,25 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         os.fsync(folder)
     finally:
         os.close(folder)
+    return digest
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole."""
-    write_whole(path, lambda file: file.write(text.encode()))
+def write_text(path: Path, text: str) -> str:
+    """Write a text file whole; its checksum."""
+    return write_whole(path, lambda file: file.write(text.encode()))
 
 
-def write_json(path: Path, value: Any) -> None:
-    """Write a JSON file whole; NaN becomes null."""
-    write_text(path, json.dumps(plain(value), allow_nan=False, ensure_ascii=False, indent=1) + "\n")
+def write_json(path: Path, value: Any) -> str:
+    """Write a JSON file whole; NaN becomes null; its checksum."""
+    return write_text(path, json.dumps(plain(value), allow_nan=False, ensure_ascii=False, indent=1) + "\n")
 
 
-def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write named arrays as npz whole."""
-    write_whole(path, lambda file: np.savez(file, allow_pickle=False, **arrays))  # pyright: ignore[reportArgumentType]
+def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> str:
+    """Write named arrays as npz whole; its checksum."""
+    return write_whole(
+        path,
+        lambda file: np.savez(file, allow_pickle=False, **arrays),  # pyright: ignore[reportArgumentType]
+    )
 
 
 def versions() -> dict[str, str]:
@@ -71,8 +83,8 @@ def write_result(directory: Path, result: Result) -> None:
     write_json(directory / RESULT, result.to_json())
 
 
-def write_shard(path: Path, shard: Shard, reference: Reference, tracks: Tracks) -> None:
-    """Write a finished shard: its answer and the truth of its trials."""
+def write_shard(path: Path, shard: Shard, reference: Reference, tracks: Tracks) -> str:
+    """Write a finished shard: its answer and the truth of its trials; the file's checksum."""
     arrays: dict[str, np.ndarray] = {"time_s": reference.time_s}
     meta: dict[str, Any] = {
         "algorithm": shard.algorithm,
@@ -94,7 +106,7 @@ def write_shard(path: Path, shard: Shard, reference: Reference, tracks: Tracks) 
     for n, series in enumerate(tracks.series.values()):
         arrays[f"series/{n}"] = series.value
     arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
-    write_arrays(path, arrays)
+    return write_arrays(path, arrays)
 
 
 def read_shard(path: Path) -> tuple[Shard, Reference, Tracks]:

@@ -228,9 +228,10 @@ class Jobs:
                 )
                 if answer is None:
                     raise asyncio.CancelledError
-                await asyncio.to_thread(artifacts.write_shard, self._shard_file(job.id, number), shard, *answer)
+                path = self._shard_file(job.id, number)
+                digest = await asyncio.to_thread(artifacts.write_shard, path, shard, *answer)
                 watch.finish(number)
-                await asyncio.to_thread(self.store.finish_shard, job.id, number, watch.fraction)
+                await asyncio.to_thread(self.store.finish_shard, job.id, number, digest, watch.fraction)
 
         try:
             async with asyncio.TaskGroup() as group:

@@ -13,10 +13,11 @@ from typing import Any
 
 from server.wire import dumps
 
-VERSION = 1
 FINAL = frozenset({"done", "failed", "cancelled"})
 
-SCHEMA = """
+#: What takes the database from each version of its schema to the next, in order; add to the end, change nothing.
+MIGRATIONS = (
+    """
 CREATE TABLE jobs (
     id TEXT PRIMARY KEY, state TEXT NOT NULL, title TEXT NOT NULL, scenario TEXT, family TEXT NOT NULL,
     algorithms TEXT NOT NULL, trials INTEGER NOT NULL, seed INTEGER NOT NULL,
@@ -34,12 +35,33 @@ CREATE TABLE shards (
     job TEXT NOT NULL REFERENCES jobs(id) ON DELETE CASCADE, number INTEGER NOT NULL,
     PRIMARY KEY (job, number)
 );
-"""
+""",
+    # Blocks of trials were cut differently before, so the shards of unfinished jobs are computed again.
+    """
+ALTER TABLE jobs ADD COLUMN client TEXT NOT NULL DEFAULT '';
+ALTER TABLE jobs ADD COLUMN purpose TEXT NOT NULL DEFAULT 'run';
+ALTER TABLE jobs ADD COLUMN limit_s REAL;
+ALTER TABLE jobs ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE jobs ADD COLUMN lost TEXT NOT NULL DEFAULT '[]';
+DELETE FROM shards;
+ALTER TABLE shards ADD COLUMN sha256 TEXT NOT NULL DEFAULT '';
+ALTER TABLE shards ADD COLUMN lost TEXT;
+CREATE TABLE rates (
+    algorithm TEXT NOT NULL, family TEXT NOT NULL, work REAL NOT NULL, seconds REAL NOT NULL,
+    PRIMARY KEY (algorithm, family)
+);
+""",
+)
+VERSION = len(MIGRATIONS)
 
 
 @dataclass(frozen=True)
 class Job:
-    """A job as the store has it; `public` is what its owner sees."""
+    """A job as the store has it; `public` is what its owner sees.
+
+    purpose is "run" or "what-if", which goes before others; limit_s bounds the time it may run; lost tells of the
+    shards that were given up: {"algorithm", "trials", "seed", "tries", "reason"} each.
+    """
 
     id: str
     state: str
@@ -59,10 +81,15 @@ class Job:
     progress: float = 0.0
     error: dict[str, str] | None = None
     notes: list[str] = field(default_factory=list)
+    client: str = ""
+    purpose: str = "run"
+    limit_s: float | None = None
+    pinned: bool = False
+    lost: list[dict[str, Any]] = field(default_factory=list)
 
     def public(self) -> dict[str, Any]:
         """The job as REST shows it."""
-        hidden = {"toml", "digest", "origin", "idempotency_key"}
+        hidden = {"toml", "digest", "origin", "idempotency_key", "client"}
         return {k: v for k, v in asdict(self).items() if k not in hidden}
 
 
@@ -75,7 +102,7 @@ class Event:
     data: str
 
 
-_JSON = {"algorithms", "error", "notes"}
+_JSON = {"algorithms", "error", "notes", "lost"}
 _COLUMNS = [f.name for f in fields(Job)]
 
 
@@ -88,14 +115,19 @@ class Store:
         self._db.row_factory = sqlite3.Row
         for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
             self._db.execute(f"PRAGMA {pragma}")
+        self._migrate(path)
+
+    def _migrate(self, path: Path) -> None:
+        """Take the database to the newest schema, one whole step at a time; a later version's is left alone."""
         found = self._db.execute("PRAGMA user_version").fetchone()[0]
-        if found == 0:
+        if found > VERSION:
+            self._db.close()
+            raise RuntimeError(f"{path} was written by a later version of coopnav (schema {found}, here {VERSION})")
+        for version in range(found, VERSION):
             with self._transaction() as db:
-                for statement in SCHEMA.split(";"):
+                for statement in MIGRATIONS[version].split(";"):
                     db.execute(statement)
-                db.execute(f"PRAGMA user_version={VERSION}")
-        elif found != VERSION:
-            raise RuntimeError(f"{path} was written by another version of coopnav (schema {found}, here {VERSION})")
+                db.execute(f"PRAGMA user_version={version + 1}")
 
     def close(self) -> None:
         with self._lock:
@@ -158,17 +190,59 @@ class Store:
         with self._transaction() as db:
             db.execute("DELETE FROM jobs WHERE id=?", (id,))
 
-    def finish_shard(self, id: str, number: int, progress: float) -> None:
-        """Keep that a shard's file is complete."""
+    def finish_shard(self, id: str, number: int, sha256: str, progress: float) -> None:
+        """Keep that a shard's file is complete, and its checksum; nothing where the job has ended."""
+        self._end_shard(id, number, sha256, None, progress)
+
+    def lose_shard(self, id: str, number: int, lost: dict[str, Any], progress: float) -> None:
+        """Keep that a shard was given up, and what of."""
+        self._end_shard(id, number, "", dumps(lost), progress)
+
+    def _end_shard(self, id: str, number: int, sha256: str, lost: str | None, progress: float) -> None:
         with self._transaction() as db:
-            db.execute("INSERT OR IGNORE INTO shards (job, number) VALUES (?,?)", (id, number))
+            row = db.execute("SELECT state FROM jobs WHERE id=?", (id,)).fetchone()
+            if row is None or row["state"] in FINAL:
+                return
+            db.execute(
+                "INSERT OR REPLACE INTO shards (job, number, sha256, lost) VALUES (?,?,?,?)", (id, number, sha256, lost)
+            )
             db.execute("UPDATE jobs SET progress=max(progress,?) WHERE id=?", (progress, id))
 
-    def shards(self, id: str) -> list[int]:
-        """Numbers of the shards whose files are complete."""
+    def forget_shard(self, id: str, number: int) -> None:
+        """A finished shard's file turned out to be damaged: it has to run again."""
+        with self._transaction() as db:
+            db.execute("DELETE FROM shards WHERE job=? AND number=?", (id, number))
+
+    def shards(self, id: str) -> dict[int, str]:
+        """Shards whose files are complete, by number in order, with the files' checksums."""
         with self._lock:
-            rows = self._db.execute("SELECT number FROM shards WHERE job=? ORDER BY number", (id,)).fetchall()
-        return [row["number"] for row in rows]
+            rows = self._db.execute(
+                "SELECT number, sha256 FROM shards WHERE job=? AND lost IS NULL ORDER BY number", (id,)
+            ).fetchall()
+        return {row["number"]: row["sha256"] for row in rows}
+
+    def lost(self, id: str) -> dict[int, dict[str, Any]]:
+        """Shards that were given up, by number in order, with what is known of each."""
+        with self._lock:
+            rows = self._db.execute(
+                "SELECT number, lost FROM shards WHERE job=? AND lost IS NOT NULL ORDER BY number", (id,)
+            ).fetchall()
+        return {row["number"]: json.loads(row["lost"]) for row in rows}
+
+    def worked(self, algorithm: str, family: str, work: float, seconds: float) -> None:
+        """Learn from a finished shard what work (trials x subjects x mission seconds) costs; the past fades."""
+        with self._transaction() as db:
+            db.execute(
+                "INSERT INTO rates VALUES (?,?,?,?) ON CONFLICT DO UPDATE "
+                "SET work=0.9*work+excluded.work, seconds=0.9*seconds+excluded.seconds",
+                (algorithm, family, work, seconds),
+            )
+
+    def rates(self, family: str) -> dict[str, float]:
+        """Worker seconds that a unit of work costs in a family, by algorithm, as far as it has been seen."""
+        with self._lock:
+            rows = self._db.execute("SELECT * FROM rates WHERE family=?", (family,)).fetchall()
+        return {row["algorithm"]: row["seconds"] / row["work"] for row in rows if row["work"] > 0}
 
     def append(self, events: Iterable[tuple[str, str, str]]) -> None:
         """Keep events (job, kind, JSON text) in one commit; those of a job since deleted are dropped."""
@@ -199,4 +273,4 @@ def _job(row: sqlite3.Row) -> Job:
     for name in _JSON:
         if values[name] is not None:
             values[name] = json.loads(values[name])
-    return Job(**values)
+    return Job(**values | {"pinned": bool(values["pinned"])})

@@ -11,7 +11,8 @@ import pytest
 from engine.runner import Shard
 from engine.tracks import Belief, Innovations, PacketCount, Reference, Samples, Series, Tracks
 from server import artifacts
-from server.store import Job, Store
+from server import store as store_module
+from server.store import MIGRATIONS, Job, Store
 
 
 def job(id: str, **values) -> Job:
@@ -29,13 +30,13 @@ def test_what_was_kept_is_there_after_opening_again(tmp_path: Path):
     first = Store(tmp_path / "jobs.sqlite")
     first.add(job("a", notes=["n"], error={"title": "t", "detail": "d"}))
     first.append([("a", "progress", "{}")])
-    first.finish_shard("a", 3, 0.5)
+    first.finish_shard("a", 3, "sum", 0.5)
     first.close()
     again = Store(tmp_path / "jobs.sqlite")
     found = again.job("a")
     assert found is not None and found.notes == ["n"] and found.progress == 0.5
     assert [e.kind for e in again.events("a")] == ["state", "progress"]
-    assert again.shards("a") == [3]
+    assert again.shards("a") == {3: "sum"}
 
 
 def test_the_store_is_as_durable_as_sqlite_can_be(store: Store):
@@ -61,13 +62,45 @@ def test_the_unfinished_are_the_accepted_without_an_end(store: Store):
 
 def test_events_of_a_deleted_job_are_dropped(store: Store):
     store.add(job("a"))
-    store.finish_shard("a", 0, 0.1)
+    store.finish_shard("a", 0, "sum", 0.1)
     store.delete("a")
     store.append([("a", "progress", "{}")])
-    assert store.events("a") == [] and store.shards("a") == []
+    assert store.events("a") == [] and store.shards("a") == {}
 
 
-def test_another_versions_store_is_left_alone(tmp_path: Path):
+def test_a_store_of_every_earlier_version_is_brought_up_to_date_with_its_jobs(tmp_path: Path):
+    """A database as each version of the schema left it, with a job of that time in it."""
+    for version in range(1, len(MIGRATIONS)):
+        path = tmp_path / f"{version}.sqlite"
+        with sqlite3.connect(path) as db:
+            for step in MIGRATIONS[:version]:
+                db.executescript(step)
+            db.execute(f"PRAGMA user_version={version}")
+            db.execute(
+                "INSERT INTO jobs (id, state, title, family, algorithms, trials, seed, created_at, progress, notes,"
+                " toml, origin, digest) VALUES ('a','done','T','navigation','[\"cekf\"]',3,7,'',1,'[]','','','d')"
+            )
+        found = Store(path).job("a")
+        assert found is not None and (found.state, found.trials, found.algorithms) == ("done", 3, ["cekf"])
+        assert found.pinned is False and found.lost == []
+        assert Store(path).job("a") == found
+
+
+def test_a_migration_that_breaks_leaves_the_store_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "jobs.sqlite"
+    Store(path).add(job("a"))
+    steps = (*MIGRATIONS, "CREATE TABLE extra (x); ALTER TABLE nowhere ADD COLUMN y")
+    with monkeypatch.context() as patched:
+        patched.setattr(store_module, "MIGRATIONS", steps)
+        patched.setattr(store_module, "VERSION", len(steps))
+        with pytest.raises(sqlite3.OperationalError, match="nowhere"):
+            Store(path)
+    again = Store(path)
+    assert again.job("a") == job("a")
+    assert not again._db.execute("SELECT 1 FROM sqlite_master WHERE name='extra'").fetchall()
+
+
+def test_a_later_versions_store_is_left_alone(tmp_path: Path):
     path = tmp_path / "jobs.sqlite"
     Store(path).close()
     with sqlite3.connect(path) as db:
