@@ -7,12 +7,13 @@ and every trial has its own random streams, so results do not depend on who comp
 from __future__ import annotations
 
 import contextlib
+import itertools
 import multiprocessing
 import os
 import queue
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -28,6 +29,8 @@ from engine.tracks import Reference, Tracks, stack, stack_references
 
 #: Trials computed together: enough to make array arithmetic pay, few enough to stream and cancel promptly.
 BLOCK = 50
+#: The first block is small, so that a watcher sees the first estimates soon.
+FIRST = 5
 
 
 @dataclass(frozen=True)
@@ -38,9 +41,10 @@ class Shard:
     trials: tuple[int, ...]
 
 
-def blocks(trials: int, size: int = BLOCK) -> list[tuple[int, ...]]:
-    """Trial numbers 0..trials-1 in consecutive blocks."""
-    return [tuple(range(i, min(i + size, trials))) for i in range(0, trials, size)]
+def blocks(trials: int, size: int = BLOCK, first: int = FIRST) -> list[tuple[int, ...]]:
+    """Trial numbers 0..trials-1 in consecutive blocks that end at multiples of size, the first of them cut in two."""
+    ends = sorted({min(first, size, trials), *range(size, trials, size), trials})
+    return [tuple(range(a, b)) for a, b in itertools.pairwise([0, *ends])]
 
 
 def chosen(scenario: ScenarioBase, algorithms: Sequence[str] | None = None) -> list[str]:
@@ -126,15 +130,24 @@ def run_shard(scenario: ScenarioBase, shard: Shard, progress: Progress = silent)
     return Reference(mission.time_s, mission.truth), tracks
 
 
-def gather(scenario: ScenarioBase, parts: Sequence[tuple[Shard, Reference, Tracks]], names: Sequence[str]) -> Result:
-    """The result of finished shards in any order; every algorithm must have the same blocks."""
+def gather(
+    scenario: ScenarioBase,
+    parts: Sequence[tuple[Shard, Reference, Tracks]],
+    names: Sequence[str],
+    lost: Sequence[dict[str, Any]] = (),
+) -> Result:
+    """The result of finished shards in any order; every algorithm must have the same blocks.
+
+    lost tells of shards that were given up; the result is of the trials there are.
+    """
     by_algorithm: dict[str, dict[int, Tracks]] = {name: {} for name in names}
     references: dict[int, tuple[Reference, int]] = {}
     for shard, reference, tracks in parts:
         by_algorithm[shard.algorithm][shard.trials[0]] = tracks
         references[shard.trials[0]] = (reference, len(shard.trials))
     whole = {name: stack([done[k] for k in sorted(done)]) for name, done in by_algorithm.items() if done}
-    return assemble(scenario, stack_references([references[k] for k in sorted(references)]), whole)
+    result = assemble(scenario, stack_references([references[k] for k in sorted(references)]), whole)
+    return replace(result, trials=sum(n for _, n in references.values()), lost=list(lost)) if lost else result
 
 
 def run(

@@ -10,22 +10,20 @@ import logging
 import math
 import secrets
 import shutil
+import sqlite3
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from distributed import CancelledError as Lost
-from distributed import KilledWorker
-from distributed.comm.core import CommClosedError
-
 from engine import runner
-from engine.runner import Shard
 from engine.scenario import toml
 from engine.scenario.errors import Problem, ScenarioError
 from engine.scenario.models import ScenarioBase
 from server import artifacts, view, work
 from server.cluster import Cluster
+from server.flow import Flow
 from server.journal import Journal
+from server.plan import Plan, disk_full
 from server.problems import Refusal
 from server.settings import Settings
 from server.store import FINAL, Job, Store
@@ -34,10 +32,19 @@ from server.wire import dumps
 
 log = logging.getLogger(__name__)
 
-LOST = (Lost, CommClosedError)
 OUTLINE, VIEW = "outline.json", "view.json"
 #: Report times assumed when a result's size is estimated before it runs.
 USUAL_TIMES = 800
+#: Pause between attempts to record what a full disk did not take.
+AGAIN_S = 1.0
+
+
+class TimeIsUp(Exception):
+    """The job ran as long as it may."""
+
+
+class NothingLeft(Exception):
+    """Every block of trials lost a shard."""
 
 
 def now() -> str:
@@ -51,6 +58,8 @@ class Jobs:
     def __init__(self, store: Store, journal: Journal, cluster: Cluster, settings: Settings) -> None:
         self.store, self.journal = store, journal
         self._cluster, self._settings = cluster, settings
+        self._flow = Flow(cluster)
+        self._assembling = asyncio.Semaphore(1)
         self._folder = settings.data / "jobs"
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._running: dict[str, Watch] = {}
@@ -66,6 +75,7 @@ class Jobs:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        await self._flow.close()
 
     async def submit(
         self, scenario: ScenarioBase, name: str | None, algorithms: list[str] | None, key: str | None, body: Any
@@ -118,8 +128,6 @@ class Jobs:
         task = self._tasks.get(id)
         if changed is not None and task is not None:
             task.cancel()
-            if self._cluster.ready.is_set():
-                await self._cluster.cancel(id)
             await asyncio.gather(task, return_exceptions=True)
             self._drop_shards(id)
         return self.find(id)
@@ -191,7 +199,6 @@ class Jobs:
 
     async def _run(self, job: Job) -> None:
         try:
-            await self._cluster.ready.wait()
             await self._compute(job)
         except asyncio.CancelledError:
             raise
@@ -199,63 +206,77 @@ class Jobs:
             log.exception("job %s failed", job.id, exc_info=error)
             # Other shards may still be telling; nothing may be recorded after the final state.
             self._running.pop(job.id, None)
-            await self.journal.flush()
-            await asyncio.to_thread(self.store.change, job.id, state="failed", finished_at=now(), error=_told(error))
-            self.journal.wake()
+            await asyncio.to_thread(self._drop_shards, job.id)
+            await self._record(job.id, state="failed", finished_at=now(), error=_told(error))
         finally:
             self._running.pop(job.id, None)
+
+    async def _record(self, id: str, **values: Any) -> None:
+        """Change a job for good, waiting for room on the disk if need be."""
+        while True:
+            try:
+                await self.journal.flush()
+                await asyncio.to_thread(self.store.change, id, **values)
+            except sqlite3.OperationalError as error:
+                log.error("job %s: cannot record %s: %s", id, values.get("state"), error)
+                await asyncio.sleep(AGAIN_S)
+            else:
+                self.journal.wake()
+                return
 
     async def _compute(self, job: Job) -> None:
         folder = self._folder / job.id
         await asyncio.to_thread(folder.mkdir, parents=True, exist_ok=True)
         scenario = toml.loads(job.toml, origin=job.origin)
         shards = runner.shards(scenario, job.algorithms)
-        finished = set(self.store.shards(job.id))
+        await asyncio.to_thread(self._check_shards, job.id)
+        finished = {*self.store.shards(job.id), *self.store.lost(job.id)}
         watch = self._running[job.id] = Watch(job, len(shards), finished, self.journal, folder / OUTLINE)
         watch.resume(self.store)
-        if job.state == "queued":
-            await asyncio.to_thread(self.store.change, job.id, state="running", started_at=now())
-            self.journal.wake()
-
-        workers = await self._cluster.workers()
-        homes = _homes(shards, workers)
-        room = asyncio.Semaphore(2 * max(self._settings.workers, len(workers)))
-
-        async def run(number: int, shard: Shard) -> None:
-            async with room:
-                answer = await self._cluster.run(
-                    job.id, number, job.toml, job.origin, shard, homes.get(shard.trials[0])
-                )
-                if answer is None:
-                    raise asyncio.CancelledError
-                path = self._shard_file(job.id, number)
-                digest = await asyncio.to_thread(artifacts.write_shard, path, shard, *answer)
-                watch.finish(number)
-                await asyncio.to_thread(self.store.finish_shard, job.id, number, digest, watch.fraction)
-
+        plan = Plan(job, shards, self.store, watch, lambda number: self._shard_file(job.id, number))
+        self._flow.join(plan)
+        limit_s = min(job.limit_s or math.inf, self._settings.longest_job_s)
         try:
-            async with asyncio.TaskGroup() as group:
-                for number, shard in enumerate(shards):
-                    if number not in finished:
-                        group.create_task(run(number, shard))
-        except BaseExceptionGroup as errors:
-            await self._cluster.cancel(job.id)
-            raise errors.exceptions[0] from None
-        notes = await asyncio.to_thread(self._assemble, job, scenario)
-        await self.journal.flush()
-        await asyncio.to_thread(self.store.change, job.id, state="done", progress=1.0, finished_at=now(), notes=notes)
-        self.journal.wake()
+            await plan.started.wait()
+            if job.state == "queued":
+                await asyncio.to_thread(self.store.change, job.id, state="running", started_at=now())
+                self.journal.wake()
+            async with asyncio.timeout(limit_s):
+                await plan.ended
+        except TimeoutError:
+            raise TimeIsUp(f"it ran for {limit_s:g} s, which is its limit") from None
+        finally:
+            self._flow.leave(plan)
+            await plan.settled.wait()
+        async with self._assembling:
+            lost = list(self.store.lost(job.id).values())
+            notes = await asyncio.to_thread(self._assemble, job, scenario, lost)
+        for algorithm, (done, seconds) in plan.cost.items():
+            await asyncio.to_thread(self.store.worked, algorithm, job.family, done, seconds)
+        await self._record(job.id, state="done", progress=1.0, finished_at=now(), notes=notes, lost=lost)
         await asyncio.to_thread(self._drop_shards, job.id)
 
-    def _assemble(self, job: Job, scenario: ScenarioBase) -> list[str]:
-        """Write the files of a finished job; what its algorithms want to be known."""
-        parts = self._parts(job)
-        result = runner.gather(scenario, parts, job.algorithms)
+    def _check_shards(self, id: str) -> None:
+        """Forget finished shards whose files are not as they were written: they run again."""
+        for number, digest in self.store.shards(id).items():
+            path = self._shard_file(id, number)
+            if not path.is_file() or artifacts.sha256(path) != digest:
+                log.warning("job %s: the file of shard %d is damaged; it runs again", id, number)
+                self.store.forget_shard(id, number)
+
+    def _assemble(self, job: Job, scenario: ScenarioBase, lost: list[dict[str, Any]]) -> list[str]:
+        """Write the files of a finished job; what its algorithms, and shards given up, want to be known."""
+        gaps = {entry["trials"][0] for entry in lost}
+        parts = [part for part in self._parts(job) if part[0].trials[0] not in gaps]
+        if not parts:
+            raise NothingLeft("; ".join(map(_loss, lost)))
+        result = runner.gather(scenario, parts, job.algorithms, lost)
         folder = self._folder / job.id
         outline = self.outline(job.id) or work.outline(scenario)
         artifacts.write_text(folder / VIEW, dumps(view.build(outline, parts, job.algorithms)))
         artifacts.write_result(folder, result)
-        return [f"{name}: {note}" for name, tracks in result.tracks.items() for note in tracks.notes]
+        notes = [f"{name}: {note}" for name, tracks in result.tracks.items() for note in tracks.notes]
+        return [_loss(entry) for entry in lost] + notes
 
     def _parts(self, job: Job) -> view.Parts:
         with contextlib.suppress(FileNotFoundError):
@@ -270,22 +291,25 @@ class Jobs:
             path.unlink(missing_ok=True)
 
 
-def _homes(shards: list[Shard], workers: list[str]) -> dict[int, str]:
-    """A worker for every block of trials, so that its mission is flown once; none where blocks are few."""
-    blocks = list(dict.fromkeys(s.trials[0] for s in shards))
-    if len(blocks) < len(workers) or not workers:
-        return {}
-    return {block: workers[n % len(workers)] for n, block in enumerate(blocks)}
+def _loss(lost: dict[str, Any]) -> str:
+    """A shard that was given up, in words."""
+    first, last = lost["trials"]
+    return (
+        f"{lost['algorithm']}: trials {first} to {last} of seed {lost['seed']} are missing from all figures: "
+        f"given up after {lost['tries']} tries, {lost['reason']}"
+    )
 
 
 def _told(error: BaseException) -> dict[str, str]:
     """A failure in the words of the person who ran the job."""
     if isinstance(error, ScenarioError):
         return {"title": "The scenario cannot be run", "detail": str(error)}
-    if isinstance(error, KilledWorker):
-        return {"title": "A worker died", "detail": "a part of the job ended its worker process several times"}
-    if isinstance(error, LOST):
-        return {"title": "The cluster was lost", "detail": "its scheduler went away while the job ran; run it again"}
+    if isinstance(error, NothingLeft):
+        return {"title": "Its workers died", "detail": str(error)}
+    if isinstance(error, TimeIsUp):
+        return {"title": "Its time is up", "detail": str(error)}
+    if disk_full(error):
+        return {"title": "The disk is full", "detail": "there was no room for its results; make room and run it again"}
     if isinstance(error, FileNotFoundError):
         return {"title": "A file is missing", "detail": str(error)}
     return {"title": "An estimator failed", "detail": f"{type(error).__name__}: {error}"}

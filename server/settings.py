@@ -19,19 +19,26 @@ def default_data() -> Path:
 class Settings:
     """Host and port, data folder, Dask scheduler address (None: a cluster of our own), and limits.
 
-    token, where set, is asked of everyone. workers counts the processes of our own cluster.
+    token, where set, is asked of everyone. cluster_ca, cluster_cert and cluster_key are PEM files for a scheduler at a
+    tls:// address. workers counts the processes of our own cluster, worker_memory (bytes; None: their share of the
+    machine's) is what one of them may use.
     """
 
     data: Path
     host: str = "127.0.0.1"
     port: int = 8000
     cluster: str | None = None
+    cluster_ca: Path | None = None
+    cluster_cert: Path | None = None
+    cluster_key: Path | None = None
     token: str | None = None
     workers: int = max(os.cpu_count() or 1, 2)
+    worker_memory: int | None = None
     largest_body: int = 2 * 1024 * 1024
     most_trials: int = 100_000
     largest_result: int = 2 * 1024**3
     most_jobs_waiting: int = 200
+    longest_job_s: float = 24 * 3600.0
     panes_per_session: int = 6
     panes_altogether: int = 48
 

@@ -245,10 +245,11 @@ class Store:
         return {row["algorithm"]: row["seconds"] / row["work"] for row in rows if row["work"] > 0}
 
     def append(self, events: Iterable[tuple[str, str, str]]) -> None:
-        """Keep events (job, kind, JSON text) in one commit; those of a job since deleted are dropped."""
+        """Keep events (job, kind, JSON text) in one commit; those of a job since ended or deleted are dropped."""
         with self._transaction() as db:
             for job, kind, data in events:
-                if db.execute("SELECT 1 FROM jobs WHERE id=?", (job,)).fetchone():
+                row = db.execute("SELECT state FROM jobs WHERE id=?", (job,)).fetchone()
+                if row is not None and row["state"] not in FINAL:
                     _append(db, job, kind, data)
 
     def events(self, id: str, after: int = 0, limit: int = 100) -> list[Event]:
@@ -273,4 +274,5 @@ def _job(row: sqlite3.Row) -> Job:
     for name in _JSON:
         if values[name] is not None:
             values[name] = json.loads(values[name])
-    return Job(**values | {"pinned": bool(values["pinned"])})
+    values["pinned"] = bool(values["pinned"])
+    return Job(**values)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import signal
 import threading
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -16,11 +18,24 @@ from engine.scenario import toml
 from engine.scenario.models import ScenarioBase
 from engine.tracks import Reference, Tracks
 
-_cancelled: set[str] = set()
+_lock = threading.Lock()
+_at_work: dict[str, int] = {}
+_stopped: set[str] = set()
 
 
-class Cancelled(Exception):
-    """The job of the shard that is running was cancelled."""
+@dataclass(frozen=True)
+class Piece:
+    """Shard `number` of a job whose scenario is a TOML text, to be read with its origin."""
+
+    job: str
+    number: int
+    text: str
+    origin: str
+    shard: Shard
+
+
+class Stopped(Exception):
+    """The job of the shard that is running has ended."""
 
 
 class Prepared(WorkerPlugin):
@@ -37,42 +52,58 @@ class Prepared(WorkerPlugin):
         import_module("engine.mission")
 
 
-def cancel(job: str) -> None:
-    """Stop the shards of a job that are running in this process at their next sign of life."""
-    _cancelled.add(job)
+def stop(key: str) -> bool:
+    """Stop the run of that key in this process; whether it is still at work.
+
+    It ends at its next sign of life, or between two steps of Python: a mission being flown gives no signs.
+    """
+    with _lock:
+        thread = _at_work.get(key)
+        if thread is not None and key not in _stopped:
+            _stopped.add(key)
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(Stopped))
+        return thread is not None
 
 
-def run(topic: str, job: str, number: int, text: str, origin: str, shard: Shard) -> tuple[Reference, Tracks] | None:
-    """Run shard `number` of a job and tell of it on a topic; None where the job was cancelled meanwhile.
+def run(topic: str, key: str, piece: Piece) -> tuple[Reference, Tracks] | None:
+    """Run a piece under a key and tell of it on a topic; None where it was stopped.
 
     Told are {"job", "number", "algorithm", "fraction", "partial", "outline"}: estimates and the outline of the
     mission come from the shards of trial 0 alone.
     """
     worker = get_worker()
+    shard = piece.shard
     watched = shard.trials[0] == 0
 
     def tell(fraction: float, partial: Any = None, *, outline: Any = None) -> None:
-        if job in _cancelled:
-            raise Cancelled
         message = {
-            "job": job,
-            "number": number,
+            "job": piece.job,
+            "number": piece.number,
             "algorithm": shard.algorithm,
             "fraction": fraction,
             "partial": partial if watched else None,
             "outline": outline,
         }
-        worker.log_event(topic, message)
+        with _lock:  # so that it is not stopped halfway through
+            if key in _stopped:
+                raise Stopped
+            worker.log_event(topic, message)
 
     try:
-        scenario = toml.loads(text, origin=origin)
+        with _lock:
+            _at_work[key] = threading.get_ident()
+        scenario = toml.loads(piece.text, origin=piece.origin)
         tell(0.0)
         mission = runner.prepare(scenario, shard.trials)
         if watched:
             tell(0.0, outline=outlined(scenario.family, mission))
         return runner.run_shard(scenario, shard, tell)
-    except Cancelled:
+    except Stopped:
         return None
+    finally:
+        with _lock:
+            _at_work.pop(key, None)
+            _stopped.discard(key)
 
 
 def outline(scenario: ScenarioBase) -> dict[str, Any]:

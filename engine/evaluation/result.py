@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ class Result:
     """All algorithms' answers to one scenario, scored.
 
     metrics {algorithm: {subject: metrics}}; claims as `engine.evaluation.claims.check` gives them;
-    truth {subject: (trials or 1, T, 2)} m at time_s (T,).
+    truth {subject: (trials or 1, T, 2)} m at time_s (T,). lost: blocks of trials that are missing, and why.
     """
 
     scenario: dict[str, Any]
@@ -33,10 +33,11 @@ class Result:
     truth: dict[str, np.ndarray]
     time_s: np.ndarray
     capacity_bps: float | None = None
+    lost: list[dict[str, Any]] = field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
         """The contents of result.json: plain types, no NaN, no infinity."""
-        return {
+        told = {
             "schema": SCHEMA,
             "scenario": self.scenario,
             "seed": self.seed,
@@ -44,6 +45,7 @@ class Result:
             "algorithms": _algorithms(self.tracks, self.metrics, self.capacity_bps),
             "claims": self.claims,
         }
+        return told | {"lost": self.lost} if self.lost else told
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The contents of arrays.npz: float64, truth repeated for every trial."""
