@@ -54,14 +54,19 @@ def record_noise(shape: tuple[int, ...], sonar: Sonar, noise: Noise, rng: np.ran
     return np.fft.irfft(parts.view(np.complex64)[..., 0], N, axis=-1)[..., : sonar.record_samples]
 
 
-def gain_for(snr_db: np.ndarray | float, sonar: Sonar, noise: Noise) -> np.ndarray | float:
+def gain_for(
+    snr_db: np.ndarray | float, sonar: Sonar, noise: Noise, echo_s: float = 0.0, echo: float = 0.0
+) -> np.ndarray | float:
     """Factor on `record_noise` that gives a unit chirp this ratio after the plain matched filter, dB (C19 eq. 4.14).
 
-    The ratio is of the squared output at the arrival to the mean squared output due to noise.
+    The ratio is of the squared output at the arrival to the mean squared output due to noise. An echo of relative
+    amplitude `echo` that follows so soon, after echo_s, that it merges with the chirp counts with it.
     """
     N = sonar.fft_samples
+    f = np.fft.rfftfreq(N, 1 / sonar.sampling_hz)
     S2 = np.abs(np.fft.rfft(sonar.waveform, N)) ** 2
     S2[1:] *= 2.0
-    peak = S2.sum() / N
-    mean_square = (S2 * density(np.fft.rfftfreq(N, 1 / sonar.sampling_hz), noise)).sum() / N
+    output = S2 * (1 + echo * np.exp(-2j * np.pi * f * echo_s))
+    peak = np.abs(output.sum()) / N
+    mean_square = (S2 * density(f, noise)).sum() / N
     return np.sqrt(peak**2 / mean_square / 10 ** (np.asarray(snr_db) / 10))

@@ -105,12 +105,15 @@ def record(
 ) -> np.ndarray:
     """Records (..., record_samples), float32, of receivers (..., 3) hearing a beacon (..., 3), metres, z up.
 
-    The noise is such that the direct path alone, from reference_m, has the ratio snr_db (...,) after the plain matched
-    filter; nearer it is louder, farther fainter.
+    The noise is such that from reference_m the direct path, with the surface's echo on its heels, has the ratio
+    snr_db (...,) after the plain matched filter; nearer it is louder, farther fainter.
     """
     delay, amplitude = paths(beacon, receiver, water)
     heard = arrivals(delay, amplitude * reference_m**water.spreading, sonar)
-    gain = np.asarray(gain_for(snr_db, sonar, noise), dtype=np.float32)
+    deep = float(np.ravel(beacon)[2]), float(np.ravel(receiver)[2])
+    farther = np.hypot(reference_m, deep[0] + deep[1]) - np.hypot(reference_m, deep[0] - deep[1])
+    after = float(farther / water.sound_speed_mps)
+    gain = np.asarray(gain_for(snr_db, sonar, noise, after, water.surface_reflection), dtype=np.float32)
     sounds = record_noise(heard.shape[:-1], sonar, noise, rng)
     sounds *= gain[..., None]
     sounds += heard

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -17,6 +17,8 @@ from engine.acoustics.zoom import zoom_transform
 SLACK_M = 12.0
 #: Quantile below which power and correlation are taken for noise (C19: 0.6 to 0.8).
 FLOOR = 0.8
+#: Look angles at which a new array is focused once.
+SCAN = 120
 #: The most that an array may say for one place against another, as a log likelihood ratio. Loud records would say
 #: more, but echoes and bent wave fronts, which no likelihood of noise knows, grow with them.
 MOST_NATS = 30.0
@@ -29,9 +31,9 @@ class SyntheticArray:
     """What m records tell of a beacon and of the elements' positions, whatever these turn out to be.
 
     envelope (m, W) complex output of the matched filter over the range window ranges_m (W,), divided by the root mean
-    square of its noise; outside of the window there is nothing that several records agree on. focus_m is the range
-    the beam is focused on. Log likelihoods are those of a known signal in noise (C19 eq. 4.26), its amplitude and
-    phase estimated, times `temper`.
+    square of its noise; outside of the window there is nothing that several records agree on. focus_m is the range the
+    beam is focused on, loudest the power there if the elements are where they were believed to be. Log likelihoods are
+    those of a known signal in noise (C19 eq. 4.26), its amplitude and phase estimated, times `temper`.
     """
 
     sonar: Sonar
@@ -39,6 +41,7 @@ class SyntheticArray:
     envelope: np.ndarray
     ranges_m: np.ndarray
     focus_m: float
+    loudest: float
     temper: float
     floor: float = FLOOR
 
@@ -91,14 +94,13 @@ class SyntheticArray:
         total: np.ndarray | float = 0.0
         for i in range(self.elements):
             apart = beacon - positions[..., i, :]
-            total = total + self._output(i, np.sqrt((apart**2).sum(-1)))
+            total = total + self.output(i, np.sqrt((apart**2).sum(-1)))
         return np.abs(total) ** 2
 
     def log_likelihood(self, positions: np.ndarray, beacon: np.ndarray) -> np.ndarray:
-        """Of elements at (..., m, 2) and a beacon at (..., 2) together: (...,), at most 0, never below -DOUBT_NATS."""
-        most = np.abs(self.envelope).max(-1).sum() ** 2
-        below = self.temper / self.elements * (self.focused_power(positions, beacon) - most)
-        return np.logaddexp(below, -DOUBT_NATS) - np.log1p(np.exp(-DOUBT_NATS))
+        """Of elements at (..., m, 2) with a beacon at (..., 2): (...,), 0 where it was loudest, above -DOUBT_NATS."""
+        below = self.temper / self.elements * (self.focused_power(positions, beacon) - self.loudest)
+        return np.logaddexp(below, -DOUBT_NATS)
 
     def leave_one_out(self, beacon: np.ndarray, positions: np.ndarray, i: int) -> np.ndarray:
         """Power (N, W) of the others' summed output plus element i's as if at ranges_m from the beacon (C19 eq. 4.124).
@@ -109,7 +111,7 @@ class SyntheticArray:
         others = np.zeros(len(beacon), dtype=self.envelope.dtype)
         for j in range(self.elements):
             if j != i:
-                others += self._output(j, np.linalg.norm(beacon - positions[:, j], axis=-1))
+                others += self.output(j, np.linalg.norm(beacon - positions[:, j], axis=-1))
         return np.abs(others[:, None] + self.envelope[i]) ** 2
 
     def range_density(self, beacon: np.ndarray, positions: np.ndarray, i: int) -> np.ndarray:
@@ -135,7 +137,7 @@ class SyntheticArray:
     def _range_at(self, bin_: np.ndarray) -> np.ndarray:
         return self.ranges_m[0] + bin_ * (self.ranges_m[1] - self.ranges_m[0])
 
-    def _output(self, i: int, range_m: np.ndarray) -> np.ndarray:
+    def output(self, i: int, range_m: np.ndarray) -> np.ndarray:
         place = (range_m - self.ranges_m[0]) / (self.ranges_m[1] - self.ranges_m[0])
         last = self.envelope.shape[1] - 1
         k = np.clip(place.astype(np.int64), 0, last - 1)
@@ -175,13 +177,10 @@ def synthesize(filtered: np.ndarray, positions: np.ndarray, sonar: Sonar, floor:
     band = (sonar.high_hz - sonar.low_hz) / sonar.sampling_hz
     correlations = correlate(2 * band * zoom_transform(np.real(gated), sonar), sonar, reach_m / sonar.sound_speed_mps)
     ranges = sonar.ranges_m[window]
-    loudest = np.abs(gated).max(-1).sum() ** 2 / len(gated)
-    return SyntheticArray(
-        sonar,
-        correlations,
-        gated[:, window].astype(np.complex64),
-        ranges,
-        float(ranges[np.abs(gated).sum(0)[window].argmax()]),
-        min(1.0, MOST_NATS / loudest),
-        floor,
-    )
+    array = SyntheticArray(sonar, correlations, gated[:, window].astype(np.complex64), ranges, 0.0, 0.0, 1.0, floor)
+    looks = azimuths(SCAN)
+    around = np.stack([np.cos(looks), np.sin(looks)], axis=-1)
+    loudness = array.power_along(np.broadcast_to(positions, (SCAN, *positions.shape)), around)
+    loudest, best = float(loudness.max()), int(loudness.max(0).argmax())
+    temper = min(1.0, MOST_NATS * len(filtered) / loudest)
+    return replace(array, focus_m=float(ranges[best]), loudest=loudest, temper=temper)

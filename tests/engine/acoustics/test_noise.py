@@ -4,6 +4,7 @@ from scipy.signal import welch
 
 from engine.acoustics.matched_filter import correlator_power_ratio_db, matched_filter
 from engine.acoustics.noise import Noise, density, record_noise
+from engine.acoustics.propagation import Water
 from tests.engine.acoustics.waters import SONAR, at, heard, line
 
 
@@ -56,3 +57,13 @@ def test_nearer_is_louder():
     near = heard(line(1) + [50.0, 0.0], beacon, np.random.default_rng(4), snr_db=60.0)
     far = heard(line(1), beacon, np.random.default_rng(4), snr_db=60.0)
     assert np.abs(near).max() / np.abs(far).max() == pytest.approx(2.0, rel=0.05)
+
+
+def test_the_ratio_counts_the_surfaces_echo_with_the_direct_path():
+    """At 1.5 m down it comes 6 cm later, upside down, and takes half of the low notes away."""
+    beacon, positions = at(75.0, 1.0), np.zeros((300, 2))
+    water = Water(surface_reflection=-0.5)
+    records = heard(positions, beacon, np.random.default_rng(5), snr_db=20.0, water=water)
+    delay = np.full(300, 75.0 / SONAR.sound_speed_mps)
+    measured = correlator_power_ratio_db(matched_filter(records, SONAR, phat=False), delay, SONAR)
+    assert np.median(measured) == pytest.approx(20.0, abs=1.0)
