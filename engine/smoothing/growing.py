@@ -45,13 +45,15 @@ class Growing:
     """One trial's graph: unknowns appended in order of time, a border of m unknowns known from the start.
 
     scale, where set, is the border unknown by which all ranges are too long. changed is the first unknown whose part of
-    the Cholesky factor [L; U] and of its forward solution y is out of date.
+    the Cholesky factor [L; U] and of its forward solution y is out of date. first holds, for every unknown, the first
+    one it is tied to: a single pose tied to one long ago widens the band there, and nowhere else (Cholesky's factor
+    fills no row further than it reaches).
     """
 
     def __init__(self, border: np.ndarray, scale: int | None = None) -> None:
         m = self.m = len(border)
         self.n, self.width = 0, 1
-        self.reference, self.x = np.zeros(64), np.zeros(64)
+        self.reference, self.x, self.first = np.zeros(64), np.zeros(64), np.arange(64)
         self.border_reference, self.border_x = border.copy(), border.copy()
         self.constant = System.zero(64, m, self.width)
         self.kept: dict[tuple, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
@@ -79,6 +81,7 @@ class Growing:
     def _enlarge(self) -> None:
         more = len(self.x)
         self.reference, self.x = (np.concatenate([a, np.zeros(more)]) for a in (self.reference, self.x))
+        self.first = np.concatenate([self.first, np.arange(more, 2 * more)])
         c = self.constant
         c.band = np.pad(c.band, ((0, 0), (0, more)))
         c.border = np.pad(c.border, ((0, 0), (0, more)))
@@ -120,6 +123,7 @@ class Growing:
             first, last = np.where(inside, idx, BORDER).min(axis=1), np.where(inside, idx, -1).max(axis=1)
             self._widen(int((last - first).max()))
             self.changed = min(self.changed, int(first.min()))
+            np.minimum.at(self.first, np.where(inside, idx, first[:, None]), first[:, None])
         cap = c.band.shape[1]
         p, q = np.tril_indices(idx.shape[1])
         at = np.where(inside, idx, idx - BORDER + cap)
@@ -169,11 +173,11 @@ class Growing:
         """Gauss-Newton steps from the present estimate; NotPositiveDefinite where something is undetermined."""
         self.solves += 1
         whole = self.solves % WHOLE_EVERY == 0
-        p = 0 if whole else max(0, min(self.changed, self.n - TAIL))
-        for _ in range(steps):
-            self._linearize(p)
-            p = min(p, self.changed)
-            if self._step(p) < SETTLED_M:
+        p = max(0, min(self.changed, self.n - TAIL))
+        for step in range(steps):
+            since = 0 if whole and step == 0 else p
+            self._linearize(since)
+            if self._step(min(since, self.changed)) < SETTLED_M:
                 break
 
     def _linearize(self, p: int) -> None:
@@ -226,12 +230,15 @@ class Growing:
         """Factorize from unknown p on, and solve for the unknowns from there; the largest move."""
         n, m, w, c = self.n, self.m, self.width, self.constant
         cap = c.band.shape[1]
-        band, rhs, border = c.band[:, p:n].copy(order="F"), c.rhs[p:n].copy(), c.border[:, p:n].copy()
-        if p:
+        first = self.first[p:n]
+        w = min(w, int((np.arange(p, n) - np.maximum(first, p)).max(initial=0)))
+        band, rhs, border = c.band[: w + 1, p:n].copy(order="F"), c.rhs[p:n].copy(), c.border[:, p:n].copy()
+        start = min(int(first.min(initial=p)), p)
+        if start < p:
             # The columns just before p reach into the tail: D is their part of the factor.
-            row, column = np.arange(p, min(p + w, n)), np.arange(p - min(w, p), p)
+            row, column = p + np.arange(np.flatnonzero(first < p)[-1] + 1), np.arange(start, p)
             offset = row[:, None] - column
-            D = np.where(offset <= w, self.L[np.minimum(offset, w), column], 0.0)
+            D = np.where(first[: len(row), None] <= column, self.L[np.minimum(offset, self.width), column], 0.0)
             low = np.tril(D @ D.T)
             i, j = np.tril_indices(len(row))
             band[i - j, j] -= low[i, j]
@@ -256,7 +263,7 @@ class Growing:
             W = dtbtrs(L, U.T, uplo="L", trans="T")[0]
             self.U[:, p:n] = U
         inner = dtbtrs(L, back, uplo="L", trans="T")[0].ravel()
-        self.L[:, p:n], self.y[p:n] = L, y
+        self.L[: w + 1, p:n], self.y[p:n] = L, y
         self.changed = n
         new = self.reference[p:n] + inner
         moved = np.abs(new - self.x[p:n]).max(initial=0.0)

@@ -185,5 +185,5 @@ def _sigma_index(sigma: np.ndarray) -> np.ndarray:
 
 #: A pose chain's link: age, composed pose and covariance; prior, infinite where there is none.
 POSE_LINK = np.dtype(
-    [("age", "u1"), ("z", "<f8", 3), ("R", "<f8", 6), ("prior_mean", "<f8", 3), ("prior_cov", "<f4", 6)]
+    [("age", "u1"), ("z", "<f8", 3), ("R", "<f8", 6), ("prior_mean", "<f8", 3), ("prior_cov", "<f8", 6)]
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from engine.gaussian.forms import Moments
+from engine.gaussian.forms import Moments, apply, symmetric
 from engine.navigation import packets as records
 from engine.smoothing import packets
 from engine.smoothing.choice import k_best, k_last
@@ -17,6 +17,8 @@ from engine.smoothing.packets import NONE, OLDEST, Lattice
 
 #: Chooses among the links with priors of a sender, at a launch: link numbers (trials, k), -1 for none.
 Choice = Callable[["PlaneSender", int, list[int]], np.ndarray]
+#: Information (1/m^2, 1/rad^2) that every direction of a pose's prior gets, so that it has a covariance.
+LEAST_PRIOR = 1e-9
 
 
 class PlaneSender:
@@ -161,8 +163,8 @@ class PoseSender:
             prior = self._prior(n, now)
             links["prior_cov"][:, slot] = np.inf
             if prior is not None:
-                links["prior_mean"][:, slot] = prior[1]
-                links["prior_cov"][:, slot] = np.linalg.inv(prior[0])[:, upper[0], upper[1]]
+                links["prior_mean"][:, slot] = prior[0]
+                links["prior_cov"][:, slot] = prior[1][:, upper[0], upper[1]]
         return records.encode(
             self.layout,
             self.trials,
@@ -173,17 +175,18 @@ class PoseSender:
         )
 
     def _prior(self, n: int, now: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """The prior of link n as it is known at launch `now`: mean and covariance, or None.
+
+        A fix between two launches ties a pose's heading to its place and leaves one direction free: that direction's
+        mean is where odometry leads, its variance large but finite.
+        """
         link = self.chain.links[n]
-        if n == now:
-            return self.chain.fresh[n]
-        return (
-            None
-            if link.prior_information is None or link.prior_mean is None
-            else (
-                link.prior_information,
-                link.prior_mean,
-            )
-        )
+        told = self.chain.fresh[n] if n == now else (link.prior_information, link.prior_mean)
+        if told is None or told[0] is None or told[1] is None:
+            return None
+        information, near = told[0], self.whole[n].z
+        cov = symmetric(np.linalg.inv(information + LEAST_PRIOR * np.eye(3)))
+        return near + apply(cov, apply(information, told[1] - near)), cov
 
 
 def pose_layout(k: int) -> np.dtype:

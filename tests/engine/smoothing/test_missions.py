@@ -150,3 +150,16 @@ def test_a_diver_smooths_what_a_beacon_tells_it(recorded_data):
         for name in ("k_last", "cekf")
     }
     assert rmse["k_last"] < 1.05 * rmse["cekf"] < 4.5
+
+
+@pytest.mark.recorded
+def test_robots_in_se2_keep_every_range_they_measure(recorded_data):
+    """The first minutes of five robots: fixes between launches tie headings to places, and leave a direction free."""
+    recorded_data("mrclam6")
+    short = library.find("mrclam6-five-robots").model_copy(update={"trials": 1, "duration_s": 150.0, "claims": []})
+    mission = runner.prepare(short, (0,))
+    tracks = run(mission, "k_last")
+    assert not [note for note in tracks.notes if "left out" in note]
+    for subject, belief in tracks.beliefs.items():
+        error = np.linalg.norm(belief.mean[0] - mission.truth[subject][0], axis=-1)
+        assert np.sqrt(np.nanmean(error**2)) < 1.5
