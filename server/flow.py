@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -82,8 +84,8 @@ class Flow:
     have had little, in the order they came. One that comes late starts level with those there: idling earns nothing.
     """
 
-    def __init__(self, cluster: Cluster) -> None:
-        self._cluster = cluster
+    def __init__(self, cluster: Cluster, clock: Callable[[], float] = time.monotonic) -> None:
+        self._cluster, self._clock = cluster, clock
         self._lines: dict[Line, _Share] = {}
         self._clients: dict[str, float] = {}
         self._busy: dict[str, int] = {}
@@ -185,7 +187,7 @@ class Flow:
 
     def _over(self, turn: _Turn) -> float:
         """The turn has ended by itself; the seconds it took."""
-        seconds = asyncio.get_running_loop().time() - turn.start
+        seconds = self._clock() - turn.start
         share = self._lines.get(turn.line)
         if share is not None:
             self._charge(turn.line, seconds - turn.charged)
@@ -195,7 +197,7 @@ class Flow:
 
     async def _serve(self, turn: _Turn) -> None:
         line, piece = turn.line, turn.piece
-        turn.start = asyncio.get_running_loop().time()
+        turn.start = self._clock()
         try:
             try:
                 answer = await self._cluster.run(piece, turn.key, turn.worker)
@@ -203,8 +205,8 @@ class Flow:
                 line.put_back(piece)
                 self._over(turn)
             except WorkerDied:
-                self._over(turn)
                 await line.died(piece, turn.alone)
+                self._over(turn)
             else:
                 await line.finish(piece, answer, self._over(turn))
         except Exception as error:

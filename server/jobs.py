@@ -11,20 +11,21 @@ import math
 import secrets
 import shutil
 import sqlite3
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from engine import runner
 from engine.scenario import toml
-from engine.scenario.errors import Problem, ScenarioError
+from engine.scenario.errors import ScenarioError
 from engine.scenario.models import ScenarioBase
-from server import artifacts, view, work
+from server import artifacts, cost, view, work
 from server.cluster import Cluster
 from server.flow import Flow
 from server.journal import Journal
-from server.plan import Plan, disk_full
-from server.problems import Refusal
+from server.plan import Plan
+from server.problems import Refusal, disk_full
 from server.settings import Settings
 from server.store import FINAL, Job, Store
 from server.watch import Watch
@@ -33,8 +34,8 @@ from server.wire import dumps
 log = logging.getLogger(__name__)
 
 OUTLINE, VIEW = "outline.json", "view.json"
-#: Report times assumed when a result's size is estimated before it runs.
-USUAL_TIMES = 800
+#: A what-if job that takes more worker seconds stands in line like any other.
+WHAT_IF_S = 120.0
 #: Pause between attempts to record what a full disk did not take.
 AGAIN_S = 1.0
 
@@ -52,6 +53,23 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """A job somebody wants: a scenario and its name if it has one, and how to run it.
+
+    body is what was sent, the same for the same job under one idempotency key; client is whose turn it takes.
+    """
+
+    scenario: ScenarioBase
+    name: str | None
+    body: Any
+    algorithms: list[str] | None = None
+    key: str | None = None
+    client: str = ""
+    purpose: str = "run"
+    limit_s: float | None = None
+
+
 class Jobs:
     """Runs jobs on a cluster; what it knows for good is in the store and in the data folder."""
 
@@ -62,6 +80,7 @@ class Jobs:
         self._assembling = asyncio.Semaphore(1)
         self._folder = settings.data / "jobs"
         self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._clients: dict[str, str] = {}
         self._running: dict[str, Watch] = {}
 
     def start(self) -> None:
@@ -77,27 +96,43 @@ class Jobs:
         await asyncio.gather(*tasks, return_exceptions=True)
         await self._flow.close()
 
-    async def submit(
-        self, scenario: ScenarioBase, name: str | None, algorithms: list[str] | None, key: str | None, body: Any
-    ) -> Job:
+    def admit(self, client: str) -> None:
+        """Refusal 429 where as many jobs wait as may, altogether or of one client."""
+        most, of_client = self._settings.most_jobs_waiting, self._settings.most_jobs_of_client
+        mine = sum(owner == client for owner in self._clients.values())
+        if len(self._clients) >= most or mine >= of_client:
+            found = f"{len(self._clients)} jobs" if len(self._clients) >= most else f"{mine} jobs of yours"
+            raise Refusal(429, "busy", f"{found} are waiting already; try again later", headers={"retry-after": "10"})
+
+    def estimate(self, scenario: ScenarioBase, algorithms: list[str] | None) -> dict[str, Any]:
+        """What a job would cost, and whether it would be accepted; ScenarioError for what cannot run."""
+        names = runner.chosen(scenario, algorithms)
+        found = cost.estimate(scenario, names, self.store.rates(scenario.family))
+        return cost.told(found, self._settings, sum(self._cluster.threads.values()), len(self._tasks))
+
+    async def submit(self, wanted: Wanted) -> Job:
         """Accept a job, or find the one accepted before under the same idempotency key.
 
-        Raises ScenarioError for what cannot run, Refusal 409 for a key used with another body.
+        Raises ScenarioError for what cannot run or is too much, Refusal 409 for a key used with another body, 429 where
+        too many jobs wait, 507 where the disk has no room.
         """
-        names = runner.chosen(scenario, algorithms)
-        self._check_size(scenario, names)
-        if len(self._tasks) >= self._settings.most_jobs_waiting:
-            raise Refusal(
-                429,
-                "busy",
-                f"{len(self._tasks)} jobs are waiting already; try again later",
-                headers={"retry-after": "10"},
-            )
+        scenario = wanted.scenario
+        names = runner.chosen(scenario, wanted.algorithms)
+        digest = hashlib.sha256(json.dumps(wanted.body, sort_keys=True).encode()).hexdigest()
+        known = await asyncio.to_thread(self.store.keyed, wanted.key) if wanted.key is not None else None
+        if known is not None:
+            return _same(known, digest)
+        price = cost.estimate(scenario, names, await asyncio.to_thread(self.store.rates, scenario.family))
+        problems = cost.problems(price, self._settings)
+        if problems:
+            raise ScenarioError(problems)
+        self.admit(wanted.client)
+        await asyncio.to_thread(self._check_room, price)
         job = Job(
             id=secrets.token_hex(8),
             state="queued",
             title=scenario.title,
-            scenario=name,
+            scenario=wanted.name,
             family=scenario.family,
             algorithms=names,
             trials=scenario.trials,
@@ -105,15 +140,33 @@ class Jobs:
             created_at=now(),
             toml=toml.dumps(scenario),
             origin=scenario.origin,
-            idempotency_key=key,
-            digest=hashlib.sha256(json.dumps(body, sort_keys=True).encode()).hexdigest(),
+            idempotency_key=wanted.key,
+            digest=digest,
+            client=wanted.client,
+            purpose="what-if" if wanted.purpose == "what-if" and price.worker_s <= WHAT_IF_S else "run",
+            limit_s=wanted.limit_s,
         )
-        kept, new = await asyncio.to_thread(self.store.add, job)
-        if not new and kept.digest != job.digest:
-            raise Refusal(409, "idempotency", "this Idempotency-Key was used for another job; take a new one")
-        if new:
-            self._begin(kept)
+        self._clients[job.id] = job.client
+        try:
+            kept, new = await asyncio.to_thread(self.store.add, job)
+            if not new:
+                return _same(kept, digest)
+        finally:
+            if job.id not in self._tasks:
+                del self._clients[job.id]
+        self._begin(kept)
         return kept
+
+    def _check_room(self, price: cost.Cost) -> None:
+        """Refusal 507 where the disk has no room for a result and its shards."""
+        free = shutil.disk_usage(self._settings.data).free
+        if free - 2 * price.result_bytes < self._settings.least_free_disk:
+            raise Refusal(
+                507,
+                "storage",
+                f"the disk has {free / 1e9:.2f} GB left, which is too little for a result of about "
+                f"{price.result_bytes / 1e9:.2f} GB; delete jobs that are no longer needed",
+            )
 
     async def cancel(self, id: str) -> Job:
         """End a job now; one that has ended stays as it is."""
@@ -176,26 +229,10 @@ class Jobs:
         if watch is not None:
             watch.hear(message)
 
-    def _check_size(self, scenario: ScenarioBase, names: list[str]) -> None:
-        problems = []
-        most = self._settings.most_trials
-        if scenario.trials > most:
-            problems.append(
-                Problem("trials", f"{scenario.trials} trials are too many for one job", f"ask for at most {most}")
-            )
-        subjects = max(len(getattr(scenario, "vehicles", ())), 1)
-        size = scenario.trials * subjects * len(names) * USUAL_TIMES * 6 * 8
-        if size > self._settings.largest_result:
-            fewer = math.floor(scenario.trials * self._settings.largest_result / size)
-            found = f"the result of {scenario.trials} trials would take about {size / 1e9:.1f} GB"
-            problems.append(Problem("trials", found, f"ask for at most {fewer}"))
-        if problems:
-            raise ScenarioError(problems)
-
     def _begin(self, job: Job) -> None:
         task = asyncio.create_task(self._run(job), name=f"job {job.id}")
-        self._tasks[job.id] = task
-        task.add_done_callback(lambda _: self._tasks.pop(job.id, None))
+        self._tasks[job.id], self._clients[job.id] = task, job.client
+        task.add_done_callback(lambda _: (self._tasks.pop(job.id, None), self._clients.pop(job.id, None)))
 
     async def _run(self, job: Job) -> None:
         try:
@@ -289,6 +326,13 @@ class Jobs:
     def _drop_shards(self, id: str) -> None:
         for path in (self._folder / id).glob("shard-*.npz"):
             path.unlink(missing_ok=True)
+
+
+def _same(known: Job, digest: str) -> Job:
+    """The job of an idempotency key, if it was asked for in the same words."""
+    if known.digest != digest:
+        raise Refusal(409, "idempotency", "this Idempotency-Key was used for another job; take a new one")
+    return known
 
 
 def _loss(lost: dict[str, Any]) -> str:

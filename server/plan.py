@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import logging
-import sqlite3
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -129,10 +127,3 @@ class Plan:
         self._left -= 1
         if self._left == 0 and not self.ended.done():
             self.ended.set_result(None)
-
-
-def disk_full(error: BaseException) -> bool:
-    """Whether an error says that there is no room left to write."""
-    if isinstance(error, sqlite3.OperationalError):
-        return "full" in str(error) or "disk I/O" in str(error)
-    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)

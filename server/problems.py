@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import logging
+import sqlite3
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Any
@@ -39,6 +41,13 @@ ANSWERS: dict[int | str, dict[str, Any]] = {
         },
     }
 }
+
+
+def disk_full(error: BaseException) -> bool:
+    """Whether an error says that there is no room left to write."""
+    if isinstance(error, sqlite3.OperationalError):
+        return "full" in str(error) or "disk I/O" in str(error)
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 @dataclass
@@ -115,6 +124,12 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, HTTPException)
         return response(_of_http(error))
 
+    async def stored(request: Request, error: Exception) -> Response:
+        if not disk_full(error):
+            return await broken(request, error)
+        log.error("%s %s: %s", request.method, request.url.path, error)
+        return response(Refusal(507, "storage", "the disk is full; delete jobs that are no longer needed"))
+
     async def broken(request: Request, error: Exception) -> Response:
         log.error("%s %s failed", request.method, request.url.path, exc_info=error)
         return response(Refusal(500, "internal", "the server failed to answer this; its log says why"))
@@ -123,4 +138,6 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(ScenarioError, bad_scenario)
     app.add_exception_handler(RequestValidationError, bad_request)
     app.add_exception_handler(HTTPException, bad_http)
+    app.add_exception_handler(sqlite3.OperationalError, stored)
+    app.add_exception_handler(OSError, stored)
     app.add_exception_handler(Exception, broken)

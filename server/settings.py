@@ -21,7 +21,8 @@ class Settings:
 
     token, where set, is asked of everyone. cluster_ca, cluster_cert and cluster_key are PEM files for a scheduler at a
     tls:// address. workers counts the processes of our own cluster, worker_memory (bytes; None: their share of the
-    machine's) is what one of them may use.
+    machine's) is what one of them may use. most_work is trials x vehicles x mission seconds x algorithms of one job;
+    least_free_disk (bytes) stays free on the disk of the data folder.
     """
 
     data: Path
@@ -37,7 +38,10 @@ class Settings:
     largest_body: int = 2 * 1024 * 1024
     most_trials: int = 100_000
     largest_result: int = 2 * 1024**3
-    most_jobs_waiting: int = 200
+    most_work: float = 2e11
+    most_jobs_waiting: int = 400
+    most_jobs_of_client: int = 250
+    least_free_disk: int = 256 * 1024**2
     longest_job_s: float = 24 * 3600.0
     panes_per_session: int = 6
     panes_altogether: int = 48

@@ -51,6 +51,10 @@ CREATE TABLE rates (
     PRIMARY KEY (algorithm, family)
 );
 """,
+    """
+ALTER TABLE jobs ADD COLUMN tags TEXT NOT NULL DEFAULT '[]';
+ALTER TABLE jobs ADD COLUMN changes TEXT NOT NULL DEFAULT '{}';
+""",
 )
 VERSION = len(MIGRATIONS)
 
@@ -60,7 +64,8 @@ class Job:
     """A job as the store has it; `public` is what its owner sees.
 
     purpose is "run" or "what-if", which goes before others; limit_s bounds the time it may run; lost tells of the
-    shards that were given up: {"algorithm", "trials", "seed", "tries", "reason"} each.
+    shards that were given up: {"algorithm", "trials", "seed", "tries", "reason"} each. tags and pinned are its owner's
+    marks; changes are the values by key path that its scenario was given on submission.
     """
 
     id: str
@@ -86,6 +91,8 @@ class Job:
     limit_s: float | None = None
     pinned: bool = False
     lost: list[dict[str, Any]] = field(default_factory=list)
+    tags: list[str] = field(default_factory=list)
+    changes: dict[str, Any] = field(default_factory=dict)
 
     def public(self) -> dict[str, Any]:
         """The job as REST shows it."""
@@ -102,7 +109,7 @@ class Event:
     data: str
 
 
-_JSON = {"algorithms", "error", "notes", "lost"}
+_JSON = {"algorithms", "error", "notes", "lost", "tags", "changes"}
 _COLUMNS = [f.name for f in fields(Job)]
 
 
@@ -162,6 +169,12 @@ class Store:
             row = self._db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone()
         return _job(row) if row is not None else None
 
+    def keyed(self, key: str) -> Job | None:
+        """The job accepted under an idempotency key."""
+        with self._lock:
+            row = self._db.execute("SELECT * FROM jobs WHERE idempotency_key=?", (key,)).fetchone()
+        return _job(row) if row is not None else None
+
     def jobs(self, limit: int = 200) -> list[Job]:
         """The newest jobs first."""
         with self._lock:
@@ -185,6 +198,14 @@ class Store:
             job = _job(db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone())
             _append(db, id, "state", dumps(job.public()))
         return job
+
+    def mark(self, id: str, **marks: Any) -> Job | None:
+        """Set tags or pinned, which may change after a job's end; None where it is gone."""
+        with self._transaction() as db:
+            for name, value in marks.items():
+                db.execute(f"UPDATE jobs SET {name}=? WHERE id=?", (_text(name, value), id))
+            row = db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone()
+        return _job(row) if row is not None else None
 
     def delete(self, id: str) -> None:
         with self._transaction() as db:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Header, Request, Response
 from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
@@ -13,6 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from engine.scenario.models import ScenarioBase
 from server import artifacts, report
 from server.inline import from_json, with_values
+from server.jobs import Wanted
 from server.problems import Refusal
 from server.shelf import unavailable
 from server.site import Here, Site
@@ -30,21 +31,46 @@ class Submission(BaseModel):
     trials: int | None = Field(None, ge=1)
     seed: int | None = Field(None, ge=0)
     set: dict[str, Any] = Field({}, max_length=200, description="key paths and their values, as in network.loss: 0.4")
+    purpose: Literal["run", "what-if"] = Field("run", description="a small what-if goes before other jobs")
+    limit_s: float | None = Field(None, gt=0, allow_inf_nan=False, description="end it if it runs longer, s")
 
 
 @router.post("/jobs", status_code=202)
 async def submit(
     body: Submission,
+    request: Request,
     response: Response,
     here: Here,
     idempotency_key: Annotated[str | None, Header(max_length=200)] = None,
+    coopnav_client: Annotated[str | None, Header(max_length=100)] = None,
 ) -> dict[str, Any]:
-    """Accept a job; the same Idempotency-Key with the same body answers with the same job."""
-    scenario = await run_in_threadpool(_wanted, body, here)
-    name = body.scenario if isinstance(body.scenario, str) else None
-    job = await here.jobs.submit(scenario, name, body.algorithms, idempotency_key, body.model_dump(mode="json"))
+    """Accept a job; the same Idempotency-Key with the same body answers with the same job.
+
+    Clients take turns: a client is what Coopnav-Client says, else a network address.
+    """
+    client = coopnav_client or (request.client.host if request.client else "")
+    if idempotency_key is None:
+        here.jobs.admit(client)
+    job = await here.jobs.submit(
+        Wanted(
+            scenario=await run_in_threadpool(_wanted, body, here),
+            name=body.scenario if isinstance(body.scenario, str) else None,
+            body=body.model_dump(mode="json"),
+            algorithms=body.algorithms,
+            key=idempotency_key,
+            client=client,
+            purpose=body.purpose,
+            limit_s=body.limit_s,
+        )
+    )
     response.headers["location"] = f"/api/jobs/{job.id}"
     return job.public()
+
+
+@router.post("/jobs/estimate")
+def estimate(body: Submission, here: Here) -> dict[str, Any]:
+    """What a job would cost (worker seconds, bytes of result and memory) and whether it would be accepted."""
+    return here.jobs.estimate(_wanted(body, here), body.algorithms)
 
 
 @router.get("/jobs")
