@@ -11,7 +11,7 @@ from fastapi import FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 
 from server import problems
-from server.api import algorithms, docs, health, jobs, page, scenarios, scenes, tables, tracking
+from server.api import algorithms, docs, health, jobs, marks, page, scenarios, scenes, tables, tracking
 from server.cluster import Cluster
 from server.guard import Guard
 from server.jobs import Jobs
@@ -65,7 +65,7 @@ def create_app(settings: Settings) -> FastAPI:
         default_response_class=Json,
     )
     problems.install(app)
-    for room in (health, algorithms, scenarios, jobs, tables, tracking, scenes, docs, page):
+    for room in (health, algorithms, scenarios, jobs, marks, tables, tracking, scenes, docs, page):
         app.include_router(room.router, responses=problems.ANSWERS)
     app.add_middleware(GZipMiddleware, minimum_size=2000, compresslevel=5)
     app.add_middleware(Guard, settings=settings)
