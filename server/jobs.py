@@ -145,6 +145,7 @@ class Jobs:
             client=wanted.client,
             purpose="what-if" if wanted.purpose == "what-if" and price.worker_s <= WHAT_IF_S else "run",
             limit_s=wanted.limit_s,
+            changes=wanted.body.get("set", {}),
         )
         self._clients[job.id] = job.client
         try:

@@ -27,7 +27,7 @@ def test_marks_that_make_no_sense_are_refused(live: Live):
 def test_the_scenario_of_a_job_runs_the_same_again(live: Live):
     job = live.done(SHORT | {"seed": 5})
     ran = live.http.get(f"/api/jobs/{job['id']}/scenario").json()
-    assert ran["name"] == "first-look"
+    assert ran["name"] == "first-look" and ran["changes"] == job["changes"] == SHORT["set"]
     changes = SHORT["set"] | {"trials": 1, "seed": 5}
     assert toml.loads(ran["toml"]) == toml.override(library.shipped("first-look"), changes)
     again = live.done({"scenario": ran["scenario"], "algorithms": job["algorithms"]})
