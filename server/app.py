@@ -16,6 +16,7 @@ from server.cluster import Cluster
 from server.guard import Guard
 from server.jobs import Jobs
 from server.journal import Journal
+from server.meter import Meter, Tally
 from server.scenes.sessions import Sessions
 from server.settings import Settings
 from server.shelf import Shelf
@@ -29,6 +30,7 @@ DESCRIPTION = """Compare cooperative underwater navigation estimators. Errors ar
 
 def create_app(settings: Settings) -> FastAPI:
     """The application; its store, cluster and scenes live from start-up to shutdown."""
+    tally = Tally()
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -39,7 +41,7 @@ def create_app(settings: Settings) -> FastAPI:
         work = Jobs(store, journal, cluster, settings)
         scenes = Sessions(settings, work)
         shelf = Shelf(settings.data / "scenarios")
-        app.state.site = Site(settings, journal, cluster, work, shelf, scenes)
+        app.state.site = Site(settings, journal, cluster, work, shelf, scenes, tally)
         starting = asyncio.create_task(cluster.start(work.hear))
         work.start()
         try:
@@ -69,4 +71,5 @@ def create_app(settings: Settings) -> FastAPI:
         app.include_router(room.router, responses=problems.ANSWERS)
     app.add_middleware(GZipMiddleware, minimum_size=2000, compresslevel=5)
     app.add_middleware(Guard, settings=settings)
+    app.add_middleware(Meter, tally=tally)
     return app

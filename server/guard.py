@@ -1,26 +1,37 @@
-"""The door: who may speak to the server, from which page, and how much at once."""
+"""The door: who may speak to the server, from which page, how much at once and how slowly."""
 
 from __future__ import annotations
 
+import asyncio
 import hmac
+import logging
+import secrets
+import time
+from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import RedirectResponse
+from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from server.attempts import Attempts
 from server.problems import Refusal, response
 from server.settings import Settings, is_loopback
 
-COOKIE = "coopnav-token"
+log = logging.getLogger(__name__)
+
+#: The cookie's name, before the port: servers on one machine's ports share its cookies.
+COOKIE = "coopnav"
 #: A body of up to this many times the limit is heard to its end before it is refused.
 PATIENCE = 8
 SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
+#: What anybody who reaches the server may ask: those who watch over it carry no token.
+OPEN = {"/api/health/live", "/api/health/ready"}
 
 PAGE_POLICY = (
-    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
-    "connect-src 'self'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; object-src 'none'"
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; "
+    "frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; object-src 'none'; form-action 'self'"
 )
 HEADERS = {
     "x-content-type-options": "nosniff",
@@ -33,10 +44,17 @@ HEADERS = {
 
 
 class Guard:
-    """ASGI middleware; a refused request gets a problem, a refused websocket is not opened."""
+    """ASGI middleware; a refused request gets a problem, a refused websocket is not opened.
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    Where a token is asked, the cookie that stands for it afterwards is a secret of this run of the server: guessing
+    tokens is slowed down by address without slowing down those who are in.
+    """
+
+    def __init__(self, app: ASGIApp, settings: Settings, clock: Callable[[], float] = time.monotonic) -> None:
         self.app, self.settings = app, settings
+        self.cookie = f"{COOKIE}-{settings.port}"
+        self._pass = secrets.token_urlsafe(32)
+        self._attempts = Attempts(clock)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -44,12 +62,11 @@ class Guard:
             return
         headers = Headers(scope=scope)
         refusal = self._host(headers) or self._origin(scope, headers)
-        if refusal is None and self.settings.token and not self._known(headers):
-            offered = dict(parse_qsl(scope["query_string"].decode("latin-1"))).get("token", "")
-            if scope["type"] == "http" and self._matches(offered):
-                await self._let_in(scope, receive, send)
+        if refusal is None and self.settings.token and scope["path"] not in OPEN and not self._inside(headers):
+            refusal = self._stranger(scope, headers)
+            if refusal is None and not _bearer(headers):
+                await self._let_in(scope, headers)(scope, receive, _with_headers(send))
                 return
-            refusal = Refusal(401, "token", "open the address with ?token=… that the server printed at its start")
         if scope["type"] == "websocket":
             if refusal is None:
                 await self.app(scope, receive, send)
@@ -68,8 +85,11 @@ class Guard:
 
     def _host(self, headers: Headers) -> Refusal | None:
         """On loopback only loopback names are ours: another name means a page rebound its DNS to us."""
-        host = urlsplit(f"//{headers.get('host', '')}").hostname or ""
-        if self.settings.loopback and not is_loopback(host):
+        try:
+            host = urlsplit(f"//{headers.get('host', '')}").hostname or ""
+        except ValueError:
+            host = ""
+        if len(headers.getlist("host")) > 1 or (self.settings.loopback and not is_loopback(host)):
             return Refusal(403, "host", "this server answers to localhost and 127.0.0.1 only")
         return None
 
@@ -78,54 +98,94 @@ class Guard:
         origin = headers.get("origin")
         if origin is None or (scope["type"] == "http" and scope["method"] in SAFE_METHODS):
             return None
-        if urlsplit(origin).netloc.lower() != headers.get("host", "").lower():
-            return Refusal(403, "origin", "requests from pages of other sites are refused")
-        return None
-
-    def _known(self, headers: Headers) -> bool:
-        scheme, _, given = headers.get("authorization", "").partition(" ")
-        if scheme.lower() == "bearer" and self._matches(given.strip()):
-            return True
         try:
-            cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+            ours = urlsplit(origin).netloc.lower() == headers.get("host", "").lower()
+        except ValueError:
+            ours = False
+        return None if ours else Refusal(403, "origin", "requests from pages of other sites are refused")
+
+    def _inside(self, headers: Headers) -> bool:
+        """Whether the cookie is there."""
+        try:
+            cookie = SimpleCookie(headers.get("cookie", "")).get(self.cookie)
         except CookieError:
             return False
-        return cookie is not None and self._matches(cookie.value)
+        return cookie is not None and _same(cookie.value, self._pass)
 
-    def _matches(self, given: str) -> bool:
-        return hmac.compare_digest(given.encode(), (self.settings.token or "").encode())
+    def _stranger(self, scope: Scope, headers: Headers) -> Refusal | None:
+        """Why one without a cookie may not enter; None with the right token, in a header or in a page's address."""
+        given = _bearer(headers)
+        if not given and scope["type"] == "http" and scope["method"] in ("GET", "HEAD"):
+            given = dict(_query(scope)).get("token", "")
+        if not given:
+            return Refusal(401, "token", "open the address with ?token=… that the server printed at its start")
+        address = (scope.get("client") or ("", 0))[0]
+        wait_s = self._attempts.wait_s(address)
+        if wait_s > 0:
+            found = f"too many wrong tokens from {address}; wait {wait_s:.0f} s"
+            return Refusal(429, "attempts", found, headers={"retry-after": f"{wait_s:.0f}"})
+        if _same(given, self.settings.token or ""):
+            return None
+        self._attempts.failed(address)
+        log.warning("a wrong token from %s", address)
+        return Refusal(401, "token", "this is not the token that the server printed at its start")
 
-    async def _let_in(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Remember the token in a cookie and take it out of the address."""
-        rest = [(k, v) for k, v in parse_qsl(scope["query_string"].decode("latin-1")) if k != "token"]
-        answer = RedirectResponse(scope["path"] + (f"?{urlencode(rest)}" if rest else ""), status_code=303)
-        answer.set_cookie(COOKIE, self.settings.token or "", httponly=True, samesite="strict", path="/")
-        await answer(scope, receive, _with_headers(send))
+    def _let_in(self, scope: Scope, headers: Headers) -> Response:
+        """Remember who gave the token by a cookie, and take the token out of the address."""
+        rest = urlencode([(k, v) for k, v in _query(scope) if k != "token"])
+        clean = "/" + scope["path"].lstrip("/\\") + (f"?{rest}" if rest else "")
+        answer: Response = RedirectResponse(clean, status_code=303)
+        if headers.get("sec-fetch-site") == "cross-site":
+            # A link in somebody's mail: the browser would not send a strict cookie along a redirect.
+            page = "<!doctype html><title>coopnav</title>"
+            answer = HTMLResponse(page, headers={"refresh": f"0; url={answer.headers['location']}"})
+        answer.headers["cache-control"] = "no-store"
+        secure = scope.get("scheme") == "https"
+        answer.set_cookie(self.cookie, self._pass, httponly=True, samesite="strict", secure=secure, path="/")
+        return answer
 
     async def _body(self, headers: Headers, receive: Receive) -> bytes | Refusal:
-        """The whole body, or the refusal of one too large; no request here needs to be streamed in.
+        """The whole body, or the refusal of one too large or too slow; no request here needs to be streamed in.
 
         What is too large is still taken in for a while and thrown away: a client that is busy sending would
         not hear the answer.
         """
         limit = self.settings.largest_body
         length = headers.get("content-length", "0")
-        declared = int(length) if length.isdigit() and len(length) < 20 else limit + 1
+        declared = int(length) if length.isascii() and length.isdigit() and len(length) < 20 else limit + 1
         parts: list[bytes] = []
         size = 0
-        while declared <= PATIENCE * limit and size <= PATIENCE * limit:
-            message = await receive()
-            if message["type"] != "http.request":
-                return b""
-            size += len(message.get("body", b""))
-            if max(size, declared) <= limit:
-                parts.append(message.get("body", b""))
-            if not message.get("more_body"):
-                break
+        try:
+            async with asyncio.timeout(self.settings.slowest_body_s):
+                while declared <= PATIENCE * limit and size <= PATIENCE * limit:
+                    message = await receive()
+                    if message["type"] != "http.request":
+                        return b""
+                    size += len(message.get("body", b""))
+                    if max(size, declared) <= limit:
+                        parts.append(message.get("body", b""))
+                    if not message.get("more_body"):
+                        break
+        except TimeoutError:
+            found = f"the body did not arrive within {self.settings.slowest_body_s:g} s"
+            return Refusal(408, "too-slow", found, headers={"connection": "close"})
         if max(size, declared) <= limit:
             return b"".join(parts)
         found = f"a request may carry at most {limit} bytes"
         return Refusal(413, "too-large", found, headers={"connection": "close"})
+
+
+def _same(given: str, right: str) -> bool:
+    return hmac.compare_digest(given.encode(), right.encode())
+
+
+def _bearer(headers: Headers) -> str:
+    scheme, _, given = headers.get("authorization", "").partition(" ")
+    return given.strip() if scheme.lower() == "bearer" else ""
+
+
+def _query(scope: Scope) -> list[tuple[str, str]]:
+    return parse_qsl(scope["query_string"].decode("latin-1"))
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 import secrets
 import socket
 import sys
 from dataclasses import replace
+from typing import Any
 
 import uvicorn
 
+from server import logs
 from server.app import create_app
+from server.patience import impatient
 from server.settings import Settings
+
+#: Connections at once; more are answered 503.
+MOST_CONNECTIONS = 1000
 
 
 class CannotServe(Exception):
@@ -46,7 +51,22 @@ def listen(settings: Settings) -> socket.socket:
     return listener
 
 
-def serve(settings: Settings) -> None:
+def configured(app: Any, settings: Settings) -> uvicorn.Config:
+    """How uvicorn serves the application, in tests as in use."""
+    return uvicorn.Config(
+        app,
+        http=impatient(settings.slowest_head_s),
+        log_config=None,
+        access_log=False,
+        limit_concurrency=MOST_CONNECTIONS,
+        ws_max_size=1024 * 1024,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=5,
+        server_header=False,
+    )
+
+
+def serve(settings: Settings, log_format: str = "text", log_level: str = "warning") -> None:
     """Serve until interrupted; prints the address to open."""
     if not settings.loopback and settings.token is None:
         settings = replace(settings, token=secrets.token_urlsafe(24))
@@ -58,18 +78,10 @@ def serve(settings: Settings) -> None:
         ) from None
     listener = listen(settings)
     settings = replace(settings, port=listener.getsockname()[1])
-    logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logs.write(log_format, log_level)
     print(f"coopnav is open at {address(settings)}", flush=True)
     print(f"jobs and scenarios are kept in {settings.data}; Ctrl-C ends the server", file=sys.stderr, flush=True)
-    config = uvicorn.Config(
-        create_app(settings),
-        log_level="warning",
-        access_log=False,
-        ws_max_size=1024 * 1024,
-        ws_per_message_deflate=False,
-        timeout_graceful_shutdown=5,
-        server_header=False,
-    )
+    config = configured(create_app(settings), settings)
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(_Server(config).serve(sockets=[listener]))
 

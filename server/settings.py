@@ -36,6 +36,8 @@ class Settings:
     workers: int = max(os.cpu_count() or 1, 2)
     worker_memory: int | None = None
     largest_body: int = 2 * 1024 * 1024
+    slowest_head_s: float = 20.0
+    slowest_body_s: float = 60.0
     most_trials: int = 100_000
     largest_result: int = 2 * 1024**3
     most_work: float = 2e11

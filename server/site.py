@@ -11,6 +11,7 @@ from starlette.requests import HTTPConnection
 from server.cluster import Cluster
 from server.jobs import Jobs
 from server.journal import Journal
+from server.meter import Tally
 from server.scenes.sessions import Sessions
 from server.settings import Settings
 from server.shelf import Shelf
@@ -26,6 +27,7 @@ class Site:
     jobs: Jobs
     shelf: Shelf
     scenes: Sessions
+    tally: Tally
 
 
 def _site(connection: HTTPConnection) -> Site:

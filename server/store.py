@@ -181,6 +181,12 @@ class Store:
             rows = self._db.execute("SELECT * FROM jobs ORDER BY rowid DESC LIMIT ?", (limit,)).fetchall()
         return [_job(row) for row in rows]
 
+    def counts(self) -> dict[str, int]:
+        """How many jobs there are in each state."""
+        with self._lock:
+            rows = self._db.execute("SELECT state, count(*) AS n FROM jobs GROUP BY state").fetchall()
+        return {row["state"]: row["n"] for row in rows}
+
     def unfinished(self) -> list[Job]:
         """Accepted jobs without an end, oldest first."""
         with self._lock:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import secrets
 import threading
 from dataclasses import dataclass
 
 import numpy as np
 import rich
-import viser
 
-from server.scenes import palette
+from server.scenes import inner, palette
 from server.scenes.footage import Footage, at
 from server.scenes.geometry import SPAN, Chart, dashes, ellipses, round_length, segments
 from server.view import thinned
@@ -36,11 +36,12 @@ class Options:
 
 
 class Pane:
-    """A viser server on loopback that shows one algorithm's estimates of a mission."""
+    """A viser server that shows one algorithm's estimates of a mission to who knows its secret."""
 
     def __init__(self) -> None:
         rich.get_console().quiet = True
-        self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.secret = secrets.token_urlsafe(24)
+        self.server = inner.start(self.secret)
         self._lock = threading.Lock()
         self.footage: Footage
         self._chart: Chart

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 
 import msgspec
 import websockets
@@ -12,10 +13,29 @@ from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
 from server.assets import viser_client
+from server.scenes import inner
 
-#: All that a viewer of a pane has to say; above all it may not ask viser for a public share tunnel.
-ALLOWED = {"ViewerCameraMessage"}
-LARGEST = 64 * 1024
+LARGEST = 4096
+Three = tuple[float, float, float]
+
+
+class Camera(msgspec.Struct, tag_field="type", tag="ViewerCameraMessage", forbid_unknown_fields=True):
+    """All that a viewer of a pane has to say; above all it may not ask viser for a public share tunnel."""
+
+    wxyz: tuple[float, float, float, float]
+    position: Three
+    fov: float
+    near: float
+    far: float
+    image_height: int
+    image_width: int
+    look_at: Three
+    up_direction: Three
+
+    def finite(self) -> bool:
+        numbers = (*self.wxyz, *self.position, *self.look_at, *self.up_direction, self.fov, self.near, self.far)
+        return all(map(math.isfinite, numbers))
+
 
 POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
@@ -35,21 +55,28 @@ def page() -> str:
     return before + head + HEAD + after
 
 
+_camera = msgspec.msgpack.Decoder(Camera)
+
+
 def permitted(data: bytes) -> bool:
     """Whether a viewer's message may reach viser."""
     try:
-        message = msgspec.msgpack.decode(data)
+        return len(data) <= LARGEST and _camera.decode(data).finite()
     except (msgspec.DecodeError, RecursionError):
         return False
-    return isinstance(message, dict) and message.get("type") in ALLOWED
 
 
-async def relay(viewer: WebSocket, port: int) -> None:
+async def relay(viewer: WebSocket, port: int, secret: str) -> None:
     """Pass a viewer's websocket on to viser on a loopback port, both ways, until either ends."""
     offered = [Subprotocol(p) for p in viewer.scope.get("subprotocols", [])]
     try:
         upstream = await connect(
-            f"ws://127.0.0.1:{port}/", subprotocols=offered or None, max_size=None, compression=None, proxy=None
+            f"ws://127.0.0.1:{port}/",
+            additional_headers={inner.HEADER: secret},
+            subprotocols=offered or None,
+            max_size=None,
+            compression=None,
+            proxy=None,
         )
     except (OSError, websockets.InvalidHandshake):
         await viewer.close(1013)
@@ -67,7 +94,7 @@ async def relay(viewer: WebSocket, port: int) -> None:
                 if message["type"] == "websocket.disconnect":
                     return
                 data = message.get("bytes") or b""
-                if len(data) <= LARGEST and permitted(data):
+                if permitted(data):
                     await upstream.send(data)
 
         ways = [asyncio.create_task(down()), asyncio.create_task(up())]

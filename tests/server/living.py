@@ -6,7 +6,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import httpx
@@ -14,7 +14,7 @@ import pytest
 import uvicorn
 
 from server.app import create_app
-from server.serving import listen
+from server.serving import configured, listen
 from server.settings import Settings
 
 PATIENCE_S = 90.0
@@ -90,8 +90,8 @@ def start(settings: Settings, ready: Callable[[Any], Any] = lambda health: healt
     """Serve in a thread of this process until the test is over; yields once the server's health is as wanted."""
     listener = listen(settings)
     port = listener.getsockname()[1]
-    app = create_app(settings)
-    server = uvicorn.Server(uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=5))
+    app = create_app(replace(settings, port=port))
+    server = uvicorn.Server(configured(app, settings))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
     thread.start()
     url = f"http://127.0.0.1:{port}"

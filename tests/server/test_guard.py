@@ -65,7 +65,9 @@ def test_elsewhere_a_token_is_asked_and_remembered():
         pass
     first = far.get("/?token=secret&x=1")
     assert first.status_code == 303 and first.headers["location"] == "/?x=1"
-    assert "HttpOnly" in first.headers["set-cookie"] and COOKIE in first.headers["set-cookie"]
+    cookie = first.headers["set-cookie"]
+    assert cookie.startswith(COOKIE) and "HttpOnly" in cookie and "SameSite=strict" in cookie
+    assert "secret" not in cookie
     assert far.get("/").text == "in"
     far.cookies.clear()
     assert far.get("/", headers={"authorization": "Bearer secret"}).text == "in"

@@ -108,8 +108,18 @@ def test_the_panes_of_a_running_job_grow(live: Live):
 
 
 def test_a_viewer_may_move_its_camera_and_nothing_else(live: Live, job: str):
-    assert relay.permitted(msgspec.msgpack.encode({"type": "ViewerCameraMessage"}))
-    for kind in ("ShareUrlRequest", "ShareUrlDisconnect", "GuiUpdateMessage", "FileTransferStartUpload", None, 1):
+    assert relay.permitted(camera(position=(1.0, 2.0, 3.0)))
+    for place in ((1.0, 2.0), (1.0, 2.0, float("nan")), (1.0, 2.0, "x"), "abc"):
+        assert not relay.permitted(camera(position=place))  # type: ignore[arg-type]
+    for kind in (
+        "ShareUrlRequest",
+        "ShareUrlDisconnect",
+        "GuiUpdateMessage",
+        "FileTransferStartUpload",
+        "ViewerCameraMessage",
+        None,
+        1,
+    ):
         assert not relay.permitted(msgspec.msgpack.encode({"type": kind}))
     for junk in (b"", b"\xc1", b"\x91" * 5000, msgspec.msgpack.encode([1]), msgspec.msgpack.encode("x")):
         assert not relay.permitted(junk)
