@@ -28,7 +28,7 @@ AGAIN_S = 1.0
 #: The cluster is looked at this often, besides being told of changes.
 LOOK_S = 0.5
 #: A run that was stopped has this long to leave its worker; then the worker is started again.
-GRACE_S = 1.0
+GRACE_S = 0.6
 STOP_POLL_S = 0.1
 #: Dask makes glibc give memory back at once, which costs arrays of many megabytes a third of their speed. A worker that
 #: reaches its memory limit is ended, not slowed down.
@@ -219,11 +219,11 @@ class Cluster:
             await asyncio.sleep(STOP_POLL_S)
 
     async def _restart(self, worker: str) -> None:
-        """End a worker's process so that its nanny starts another; a worker without a nanny cannot be helped."""
+        """End a worker's process by its nanny, which starts another; a worker without a nanny cannot be helped."""
         log.warning("worker %s does not stop; it is started again", worker)
         with contextlib.suppress(Exception):
-            again: Any = self.client.restart_workers([worker], timeout=30, raise_for_error=False)
-            await asyncio.wait_for(again, 30)
+            ending: Any = self.client.run(work.end, workers=[worker], nanny=True, on_error="return")
+            await asyncio.wait_for(ending, GRACE_S)
 
 
 async def _result(future: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import signal
 import threading
 from dataclasses import dataclass
@@ -63,6 +64,11 @@ def stop(key: str) -> bool:
             _stopped.add(key)
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(Stopped))
         return thread is not None
+
+
+def end(dask_worker: Any) -> None:
+    """End the worker process of the nanny that this runs in."""
+    os.kill(dask_worker.pid, signal.SIGKILL)
 
 
 def run(topic: str, key: str, piece: Piece) -> tuple[Reference, Tracks] | None:
