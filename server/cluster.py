@@ -50,13 +50,18 @@ class ClusterLost(Exception):
 
 
 async def _own_cluster(settings: Settings) -> LocalCluster:
-    """Worker processes of our own that listen on loopback alone and show no dashboard."""
+    """Worker processes of our own that listen on loopback alone and show no dashboard.
+
+    What they are sent is code to them: TLS with credentials of this run keeps other programs of the machine out.
+    """
     with dask.config.set(PROCESSES):
         return await LocalCluster(
             n_workers=settings.workers,
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
+            protocol="tls",
+            security=Security.temporary(),
             memory_limit=settings.worker_memory or "auto",
             dashboard_address=None,  # pyright: ignore[reportArgumentType]
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},

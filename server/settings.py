@@ -22,7 +22,8 @@ class Settings:
     token, where set, is asked of everyone. cluster_ca, cluster_cert and cluster_key are PEM files for a scheduler at a
     tls:// address. workers counts the processes of our own cluster, worker_memory (bytes; None: their share of the
     machine's) is what one of them may use. most_work is trials x vehicles x mission seconds x algorithms of one job;
-    least_free_disk (bytes) stays free on the disk of the data folder.
+    least_free_disk (bytes) stays free on the disk of the data folder. slowest_head_s and slowest_body_s are how long the
+    head and the body of a request may take to arrive.
     """
 
     data: Path
