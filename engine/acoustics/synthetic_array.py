@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -138,12 +139,19 @@ class SyntheticArray:
         return self.ranges_m[0] + bin_ * (self.ranges_m[1] - self.ranges_m[0])
 
     def output(self, i: int, range_m: np.ndarray) -> np.ndarray:
-        place = (range_m - self.ranges_m[0]) / (self.ranges_m[1] - self.ranges_m[0])
-        last = self.envelope.shape[1] - 1
-        k = np.clip(place.astype(np.int64), 0, last - 1)
-        x = place - k
-        inside = (place >= 0) & (place <= last)
-        return np.where(inside, self.envelope[i][k] * (1 - x) + self.envelope[i][k + 1] * x, 0.0)
+        """Output (...,) of the matched filter of element i at ranges (...,) from the beacon; zero outside the window."""
+        value, slope = self._tables
+        spacing = self.ranges_m[1] - self.ranges_m[0]
+        place = (range_m - self.ranges_m[0]) / spacing + 1.0
+        place = np.clip(place, 0.0, value.shape[1] - 1.0)
+        k = place.astype(np.intp)
+        return value[i].take(k) + slope[i].take(k) * (place - k).astype(np.float32)
+
+    @cached_property
+    def _tables(self) -> tuple[np.ndarray, np.ndarray]:
+        """The envelope with a zero on either side, and its differences: (m, W + 2) each, complex64."""
+        value = np.pad(self.envelope, ((0, 0), (1, 1)))
+        return value, np.diff(value, axis=1, append=0).astype(np.complex64)
 
 
 def _centre(positions: np.ndarray) -> np.ndarray:
