@@ -33,7 +33,9 @@ def noise_power(filtered: np.ndarray) -> np.ndarray:
 
 
 def draw(density: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Bin position of each density (..., n) at quantile u (...,) in [0, 1): (...,), bin k from k - 1/2 to k + 1/2.
+    """Bin positions of densities (..., n) at quantiles u (...,) in [0, 1): (...,), bin k from k - 1/2 to k + 1/2.
+
+    The leading axes broadcast, so that several are drawn from one density.
 
     Inverts the piecewise linear distribution function, so that a million draws need no alias tables of a million
     densities that are each drawn from once.
@@ -41,6 +43,7 @@ def draw(density: np.ndarray, u: np.ndarray) -> np.ndarray:
     cumulative = np.cumsum(density, axis=-1)
     u = u * cumulative[..., -1]
     k = np.minimum((cumulative <= u[..., None]).sum(-1), density.shape[-1] - 1)
-    upper = np.take_along_axis(cumulative, k[..., None], -1)[..., 0]
-    mass = np.take_along_axis(density, k[..., None], -1)[..., 0]
+    wide = (*k.shape, density.shape[-1])
+    upper = np.take_along_axis(np.broadcast_to(cumulative, wide), k[..., None], -1)[..., 0]
+    mass = np.take_along_axis(np.broadcast_to(density, wide), k[..., None], -1)[..., 0]
     return k + 0.5 - (upper - u) / np.where(mass > 0, mass, 1.0)

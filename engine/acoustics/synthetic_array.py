@@ -20,6 +20,8 @@ SLACK_M = 12.0
 FLOOR = 0.8
 #: Look angles at which a new array is focused once.
 SCAN = 120
+#: Samples from range to range where one is drawn along a bearing: 0.12 m, a fraction of the chirp's resolution.
+COARSE = 3
 #: The most that an array may say for one place against another, as a log likelihood ratio. Loud records would say
 #: more, but echoes and bent wave fronts, which no likelihood of noise knows, grow with them.
 MOST_NATS = 30.0
@@ -52,7 +54,7 @@ class SyntheticArray:
         return len(self.envelope)
 
     def power(self, positions: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-        """Beam power (N, A) over look angles (A,) from the centre of elements at (N, m, 2) (C19 eq. 4.114).
+        """Beam power (..., A) over look angles (A,) from the centre of elements at (..., m, 2) (C19 eq. 4.114).
 
         In units of one element's noise power, the mean over the band's independent bins summed over them.
         """
@@ -60,7 +62,7 @@ class SyntheticArray:
         return self.correlations.power(delays)
 
     def bearing_density(self, positions: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-        """Density (N, A) over look angles, above its quantile floor (C19 eq. 4.115, Algorithm 2).
+        """Density (..., A) over look angles, above its quantile floor (C19 eq. 4.115, Algorithm 2).
 
         The likelihood of an unknown sound from there, which is the exponential of the power: the power itself, as
         (4.115) has it, leaves most samples on the noise between the beams.
@@ -68,34 +70,39 @@ class SyntheticArray:
         return floored(likely(self.temper / self.elements * self.power(positions, azimuth)), self.floor)
 
     def sample_beacon(
-        self, positions: np.ndarray, rng: np.random.Generator, strata: np.ndarray | None = None, looks: int = 360
+        self, positions: np.ndarray, rng: np.random.Generator, strata: np.ndarray | None = None, looks: int = 180
     ) -> np.ndarray:
-        """One beacon position (N, 2) for each set of element positions (N, m, 2): forward (C19 eq. 4.116-4.119).
+        """Beacon positions (..., 2) for sets of element positions (..., m, 2): forward (C19 eq. 4.116-4.119).
 
-        The bearing is drawn from the beam, at its quantiles `strata` (N,) where given, and the range from the output
-        of the filter summed over the elements along it.
+        The bearing is drawn from the beam, at its quantiles `strata` (...,) where given, and the range from the output
+        of the filter summed over the elements along it. The leading axes of positions and strata broadcast: sets with
+        an axis of length 1 have their beam formed once for all draws along it.
         """
-        quantile = rng.random(len(positions)) if strata is None else strata
+        quantile = rng.random(positions.shape[:-2]) if strata is None else strata
         theta = 2 * np.pi / looks * draw(self.bearing_density(positions, azimuths(looks)), quantile)
         u = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
-        weight = likely(self.temper / self.elements * self.power_along(positions, u))
-        r = self._range_at(draw(floored(weight, self.floor), rng.random(len(positions))))
-        return _centre(positions)[:, 0] + r[:, None] * u
+        weight = likely(self.temper / self.elements * self.power_along(positions, u, COARSE))
+        bins = draw(floored(weight, self.floor), rng.random(theta.shape))
+        return _centre(positions)[..., 0, :] + self._range_at(COARSE * bins)[..., None] * u
 
-    def power_along(self, positions: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Power (N, W) of the elements' summed filter output for a beacon at ranges_m from the centre along (N, 2)."""
-        beacon = _centre(positions) + self.ranges_m[:, None] * direction[:, None, :]
-        return self.focused_power(positions[:, None], beacon)
+    def power_along(self, positions: np.ndarray, direction: np.ndarray, every: int = 1) -> np.ndarray:
+        """Power (..., W) of the summed filter output for a beacon at `every` so many ranges_m from the centre.
+
+        positions (..., m, 2) and unit vectors direction (..., 2) broadcast.
+        """
+        beacon = _centre(positions) + self.ranges_m[::every, None] * direction[..., None, :]
+        return self.focused_power(positions[..., None, :, :], beacon)
 
     def focused_power(self, positions: np.ndarray, beacon: np.ndarray) -> np.ndarray:
         """Power (...,) of the filter output summed over elements (..., m, 2) at their ranges from a beacon (..., 2).
 
         In units of one element's noise power; the beam's power where it is focused, without what comes elsewhere.
         """
+        x, y = beacon[..., 0], beacon[..., 1]
         total: np.ndarray | float = 0.0
         for i in range(self.elements):
-            apart = beacon - positions[..., i, :]
-            total = total + self.output(i, np.sqrt((apart**2).sum(-1)))
+            dx, dy = x - positions[..., i, 0], y - positions[..., i, 1]
+            total = total + self.output(i, np.sqrt(dx * dx + dy * dy))
         return np.abs(total) ** 2
 
     def log_likelihood(self, positions: np.ndarray, beacon: np.ndarray) -> np.ndarray:
@@ -139,7 +146,7 @@ class SyntheticArray:
         return self.ranges_m[0] + bin_ * (self.ranges_m[1] - self.ranges_m[0])
 
     def output(self, i: int, range_m: np.ndarray) -> np.ndarray:
-        """Output (...,) of the matched filter of element i at ranges (...,) from the beacon; zero outside the window."""
+        """Output (...,) of element i's matched filter at ranges (...,) from the beacon; zero outside the window."""
         value, slope = self._tables
         spacing = self.ranges_m[1] - self.ranges_m[0]
         place = (range_m - self.ranges_m[0]) / spacing + 1.0

@@ -45,3 +45,10 @@ def test_the_noise_is_measured_beside_the_signal():
 
 def test_each_row_is_drawn_from_its_own_density():
     assert np.all(np.abs(draw(np.eye(7), np.random.default_rng(2).random(7)) - np.arange(7)) <= 0.5)
+
+
+def test_several_draws_share_a_density():
+    density = floored(np.random.default_rng(5).random((6, 30)), 0.2)
+    u = np.random.default_rng(6).random((6, 9))
+    together = draw(density[:, None], u)
+    np.testing.assert_array_equal(together, np.stack([draw(density, column) for column in u.T], axis=-1))
