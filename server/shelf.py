@@ -18,14 +18,14 @@ NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
 @dataclass(frozen=True)
 class Shelf:
-    """Scenario files by name; saved ones are TOML files in a folder."""
+    """Scenario files by name; saved ones are TOML files in a folder, never links out of it."""
 
     folder: Path
 
     def names(self) -> list[tuple[str, bool]]:
         """All names, with whether shipped; a shipped name hides a saved one."""
         shipped = list(library.names())
-        saved = sorted(p.stem for p in self.folder.glob("*.toml") if NAME.fullmatch(p.stem))
+        saved = sorted(p.stem for p in self.folder.glob("*.toml") if NAME.fullmatch(p.stem) and not p.is_symlink())
         return [(n, True) for n in shipped] + [(n, False) for n in saved if n not in shipped]
 
     def find(self, name: str) -> ScenarioBase:
@@ -33,7 +33,7 @@ class Shelf:
         if name in library.names():
             return library.shipped(name)
         path = self._path(name)
-        if path is None or not path.is_file():
+        if path is None or path.is_symlink() or not path.is_file():
             raise Refusal(404, "unknown-scenario", f"there is no scenario named {name[:80]!r}")
         return toml.load(path)
 

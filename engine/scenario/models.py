@@ -12,6 +12,8 @@ from engine.scenario.errors import Problem
 
 MAX_TRIALS = 100_000
 MAX_DURATION_S = 30 * 86_400.0
+#: Unknown keys of one table that are told of.
+MAX_UNKNOWN = 20
 
 #: What a vehicle, target or beacon may be called: it becomes part of key paths, array names and file columns.
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,39}$")]
@@ -39,11 +41,11 @@ class Table(BaseModel):
             return data
         fields = {f.alias or name: f for name, f in cls.model_fields.items() if f.exclude is not True}
         problems = []
-        for key in data:
-            if key not in fields and key not in cls.model_fields:
-                near = difflib.get_close_matches(str(key), fields, n=1)
-                remedy = f"did you mean {near[0]!r}?" if near else f"the keys here are: {', '.join(fields)}"
-                problems.append(Problem(str(key), "is not a key of this table", remedy))
+        unknown = [key for key in data if key not in fields and key not in cls.model_fields]
+        for key in unknown[:MAX_UNKNOWN]:
+            near = difflib.get_close_matches(str(key), fields, n=1)
+            remedy = f"did you mean {near[0]!r}?" if near else f"the keys here are: {', '.join(fields)}"
+            problems.append(Problem(str(key)[:100], "is not a key of this table", remedy))
         for key, field in fields.items():
             if field.is_required() and key not in data:
                 meaning = f": {field.description}" if field.description else ""
@@ -113,6 +115,6 @@ class ScenarioBase(Table):
     seed: int = Field(1, ge=0, lt=2**63, description="of all random draws")
     trials: int = Field(1, ge=1, le=MAX_TRIALS, description="Monte Carlo trials")
     algorithms: list[str] = Field([], max_length=64, description="estimators to compare")
-    options: dict[str, dict[str, Any]] = Field({}, description="settings of single algorithms, by name")
+    options: dict[str, dict[str, Any]] = Field({}, max_length=64, description="settings of single algorithms, by name")
     claims: list[Claim] = Field([], max_length=200, description="assertions to check against the result")
     origin: str = Field("", exclude=True)

@@ -18,17 +18,32 @@ from engine.scenario.families import MODELS
 from engine.scenario.models import ScenarioBase
 
 MAX_BYTES = 4_000_000
+#: Parts of a dotted key; the time to read one grows with their cube.
+MAX_PARTS = 32
+
+#: What dots in a TOML text mean nothing in: strings and comments.
+_QUIET = re.compile(
+    r'"""(?:[^\\]|\\.)*?"""|' + r"'''.*?'''|" + r'"(?:[^"\\\n]|\\.)*+"|' + r"'[^'\n]*+'|#[^\n]*+", re.DOTALL
+)
+_LONG_KEY = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{MAX_PARTS}}}")
 
 
 def loads(text: str, *, origin: str = "") -> ScenarioBase:
     """The scenario in a TOML text; `origin` is the folder to look for its recording in. Raises ScenarioError."""
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError([Problem("", f"this is not TOML: {error}", "correct the file there")], origin) from None
+        data = _read(text)
     except RecursionError:
         raise ScenarioError([Problem("", "this is nested too deeply", "write a plain scenario")], origin) from None
+    except ValueError as error:
+        raise ScenarioError([Problem("", f"this is not TOML: {error}", "correct the file there")], origin) from None
     return validate(data, origin=origin)
+
+
+def _read(text: str) -> dict[str, Any]:
+    """The tables in a TOML text; RecursionError or ValueError where it is none."""
+    if _LONG_KEY.search(_QUIET.sub("s", text)):
+        raise ValueError(f"a key has more than {MAX_PARTS} parts")
+    return tomllib.loads(text)
 
 
 def load(path: Path | str) -> ScenarioBase:
@@ -60,14 +75,14 @@ def validate(data: Any, *, origin: str = "") -> ScenarioBase:
     if data.get("schema") != 1 or not isinstance(data["schema"], int) or isinstance(data["schema"], bool):
         found = f"is {_shown(data['schema'])}" if "schema" in data else "is missing"
         problems.append(Problem("schema", found, "write schema = 1"))
-    family = str(data.get("family"))
-    if family not in MODELS:
+    family = data.get("family")
+    if not isinstance(family, str) or family not in MODELS:
         found = f"is {_shown(data['family'])}" if "family" in data else "is missing"
         problems.append(Problem("family", found, f"use one of: {', '.join(MODELS)}"))
     if "origin" in data:
         problems.append(Problem("origin", "is not a key of this table", "leave it out"))
     try:
-        problems += [Problem(key, f"is {number}", "give a finite number") for key, number in _not_finite(data, "")]
+        problems += _impossible(data, "")
         if problems:
             raise ScenarioError(problems)
         return MODELS[family].model_validate(data | {"origin": origin})
@@ -77,16 +92,18 @@ def validate(data: Any, *, origin: str = "") -> ScenarioBase:
         raise ScenarioError([Problem("", "this is nested too deeply", "write a plain scenario")]) from None
 
 
-def _not_finite(place: Any, key: str) -> Iterator[tuple[str, float]]:
-    """Every NaN or infinity in nested tables, by key path."""
+def _impossible(place: Any, key: str) -> Iterator[Problem]:
+    """Every NaN or infinity in nested tables, and every integer beyond TOML's 64 bits."""
     if isinstance(place, dict):
         for name, value in place.items():
-            yield from _not_finite(value, _join(key, str(name)))
+            yield from _impossible(value, _join(key, str(name)))
     elif isinstance(place, list):
         for i, value in enumerate(place):
-            yield from _not_finite(value, f"{key}[{i}]")
+            yield from _impossible(value, f"{key}[{i}]")
     elif isinstance(place, float) and not math.isfinite(place):
-        yield key, place
+        yield Problem(key, f"is {place}", "give a finite number")
+    elif isinstance(place, int) and not -(2**63) <= place < 2**63:
+        yield Problem(key, f"is an integer of {place.bit_length()} bits", "give one of at most 64")
 
 
 def dumps(scenario: ScenarioBase) -> str:
@@ -114,8 +131,8 @@ def override(scenario: ScenarioBase, values: Mapping[str, Any]) -> ScenarioBase:
 
 def _literal(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        return _read(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
         return text
 
 
@@ -131,7 +148,7 @@ def _put(data: Any, path: str, value: Any) -> None:
             names = [item.get("name") if isinstance(item, dict) else None for item in place]
             if key in names:
                 at = names.index(key)
-            elif key.isdecimal() and int(key) < len(place):
+            elif key.isdecimal() and len(key) < 10 and int(key) < len(place):
                 at = int(key)
             else:
                 known = [name for name in names if name] or [f"0 to {len(place) - 1}"]
@@ -208,5 +225,7 @@ def _shown(value: Any) -> str:
         return "a table"
     if isinstance(value, list):
         return f"a list of {len(value)}"
+    if isinstance(value, int) and value.bit_length() > 64:
+        return f"an integer of {value.bit_length()} bits"
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

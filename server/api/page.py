@@ -38,7 +38,7 @@ def icon() -> FileResponse:
 def static(path: str) -> FileResponse:
     """A file of the page, asked for anew each time, for it has no version in its name."""
     root = assets.static_directory().resolve()
-    file = (root / path).resolve()
+    file = root if "\0" in path else (root / path).resolve()
     if not file.is_relative_to(root) or not file.is_file() or file.suffix not in TYPES:
         raise Refusal(404, "unknown", "there is no such file")
     return FileResponse(file, media_type=TYPES[file.suffix], headers={"cache-control": "no-cache"})

@@ -66,9 +66,10 @@ def _read(text: str, kind: str) -> ScenarioBase:
     if kind != "application/json":
         raise Refusal(415, "media-type", "send application/json or application/toml")
     try:
-        return from_json(json.loads(text))
-    except (json.JSONDecodeError, RecursionError) as error:
+        value = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise Refusal(422, "json", f"the body is not JSON: {error}") from None
+    return from_json(value)
 
 
 def _shown(name: str, scenario: ScenarioBase, here: Here) -> dict[str, Any]:

@@ -1,0 +1,340 @@
+"""What an attacker tries, and what he gets: a table, then what takes more than one request.
+
+Who he is: a page of another site open in the user's browser; another program or user of the same machine; anybody who
+reaches a server bound to more than loopback. What he may not get: files, somebody's jobs changed, code run, a tunnel
+out, or the server's time. The user himself, and what he installed, are trusted.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import pickle
+import socket
+import ssl
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+import msgspec
+import numpy as np
+import pytest
+import viser
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from server import artifacts
+from server.attempts import FREE
+from server.scenes import inner, relay
+from server.settings import Settings
+from tests.server.living import PATIENCE_S, SHORT, Live, start, until
+
+TOKEN = "a-token-of-at-least-24-letters"
+MIB = 2**20
+JSON, TOML = {"content-type": "application/json"}, {"content-type": "application/toml"}
+BINARY, ZIPPED = {"content-type": "application/octet-stream"}, JSON | {"content-encoding": "gzip"}
+EVIL = {"origin": "http://evil.example"}
+
+
+def deep(opening: str, closing: str, times: int = 100_000) -> str:
+    return opening * times + closing * times
+
+
+UNKNOWN = "".join(f"k{n} = 1\n" for n in range(100_000))
+
+
+def with_set(key: str, value: str) -> str:
+    return f'{{"scenario": "first-look", "set": {{"{key}": {value}}}}}'
+
+
+def with_algorithm(name: str) -> str:
+    return f'{{"scenario": "first-look", "algorithms": ["{name}"]}}'
+
+
+ATTACKS = [
+    # what is tried, method, path, headers, body, answers
+    ("path traversal to a file of the page's server", "GET", "/static/../server/app.py", {}, "", {404}),
+    ("the same, encoded", "GET", "/static/%2e%2e/server/app.py", {}, "", {404}),
+    ("the same, encoded twice", "GET", "/static/%252e%252e/server/app.py", {}, "", {404}),
+    ("the same, with its slashes encoded", "GET", "/static/..%2f..%2f..%2fetc%2fpasswd", {}, "", {404}),
+    ("the same, with backslashes", "GET", "/static/..\\..\\etc\\passwd", {}, "", {400, 404}),
+    ("an absolute path", "GET", "/static//etc/passwd", {}, "", {404}),
+    ("a null byte in a path", "GET", "/static/index.html%00.png", {}, "", {404}),
+    ("a scenario name that is a path", "GET", "/api/scenarios/..%2f..%2fetc%2fpasswd", {}, "", {404}),
+    ("the same in a submission", "POST", "/api/jobs", JSON, '{"scenario": "../../../etc/passwd"}', {404}),
+    ("the same to write", "PUT", "/api/scenarios/..%2fevil", TOML, "schema = 1", {404, 405}),
+    ("the same to delete", "DELETE", "/api/scenarios/..%2f..%2fcoopnav.sqlite", {}, "", {404, 405, 422}),
+    ("a job's id that is a path", "GET", "/api/jobs/..%2f..%2fcoopnav.sqlite/result", {}, "", {404}),
+    ("a pane's id guessed", "GET", "/scenes/AAAAAAAAAAAAAAAAAAAAAAAA/", {}, "", {404}),
+    ("DNS rebinding", "GET", "/api/jobs", {"host": "evil.example:8000"}, "", {403}),
+    ("DNS rebinding, a name that begins like ours", "GET", "/api/jobs", {"host": "127.0.0.1.evil.example"}, "", {403}),
+    ("DNS rebinding with a name that is none", "GET", "/api/jobs", {"host": "[::1"}, "", {403}),
+    ("a form of another site", "POST", "/api/jobs", EVIL | {"content-type": "text/plain"}, '{"scenario":"x"}', {403}),
+    ("a script of another site", "DELETE", "/api/scenarios/mine", EVIL, "", {403}),
+    ("a page in a sandbox, or a file", "POST", "/api/jobs", {"origin": "null"} | JSON, "{}", {403}),
+    ("a page on another port", "POST", "/api/jobs", {"origin": "http://127.0.0.1:1"} | JSON, "{}", {403}),
+    ("an origin that is none", "POST", "/api/jobs", {"origin": "http://[::1"} | JSON, "{}", {403}),
+    ("a preflight of another site", "OPTIONS", "/api/jobs", EVIL, "", {405}),
+    ("a body too large", "POST", "/api/jobs", JSON, " " * (3 * MIB), {413}),
+    ("a body too large by its own word", "POST", "/api/jobs", JSON | {"content-length": str(10**15)}, "", {413}),
+    ("a compressed bomb", "POST", "/api/jobs", ZIPPED, gzip.compress(bytes(MIB)), {400, 422}),
+    ("deeply nested JSON", "POST", "/api/jobs", JSON, deep("[", "]"), {400, 422}),
+    ("deeply nested JSON objects", "PUT", "/api/scenarios/mine", JSON, deep('{"a":', "}"), {422}),
+    ("an integer of a million digits", "POST", "/api/jobs", JSON, f'{{"trials": {"9" * MIB}}}', {400, 422}),
+    ("the same to save", "PUT", "/api/scenarios/mine", JSON, f'{{"seed": {"9" * MIB}}}', {422}),
+    ("an integer of 4000 digits", "PUT", "/api/scenarios/mine", JSON, f'{{"schema": {"9" * 4000}}}', {422}),
+    ("the same in a key", "POST", "/api/jobs", JSON, with_set("seed", "9" * 4000), {422}),
+    ("the same in a path", "POST", "/api/jobs", JSON, with_set("vehicles." + "9" * 5000, "1"), {422}),
+    ("NaN where a number goes", "POST", "/api/jobs", JSON, with_set("duration_s", "NaN"), {422}),
+    ("deeply nested TOML", "PUT", "/api/scenarios/mine", TOML, "a = " + deep("[", "]"), {422}),
+    ("nested TOML tables", "PUT", "/api/scenarios/mine", TOML, "a = " + deep("{a = ", "}"), {422}),
+    ("a TOML key of a million parts", "PUT", "/api/scenarios/mine", TOML, "a" + ".a" * (MIB // 2) + " = 1", {422}),
+    ("the same, quoted", "PUT", "/api/scenarios/mine", TOML, '" . "' + '." . "' * (MIB // 8) + " = 1", {422}),
+    ("a TOML integer of 5000 digits", "PUT", "/api/scenarios/mine", TOML, "schema = " + "9" * 5000, {422}),
+    ("a TOML integer of 4 million bits", "PUT", "/api/scenarios/mine", TOML, "schema = 0x" + "f" * MIB, {422}),
+    ("a hundred thousand unknown keys", "PUT", "/api/scenarios/mine", TOML, UNKNOWN, {422}),
+    ("a pickle as a scenario", "PUT", "/api/scenarios/mine", BINARY, pickle.dumps({}), {415, 422}),
+    ("code named as an algorithm", "POST", "/api/jobs", JSON, with_algorithm("os:system"), {422}),
+    ("a file named as an algorithm", "POST", "/api/jobs", JSON, with_algorithm("/tmp/x.py"), {422}),
+    ("a method that is none", "TRACE", "/", {}, "", {405}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "headers", "body", "answers"), [row[1:] for row in ATTACKS], ids=[row[0] for row in ATTACKS]
+)
+def test_an_attack_is_answered_by_a_problem_and_leaves_nothing_behind(
+    live: Live, data_files: Callable[[], set[Path]], method: str, path: str, headers: dict, body, answers: set[int]
+):
+    before = data_files()
+    status, told = raw(live, method, path, headers, body)
+    assert status in answers, told[:300]
+    for leak in (b"Traceback", b"root:", b"SQLite", b"import "):
+        assert leak not in told
+    assert data_files() == before
+    assert live.http.get("/api/health").json()["live"]
+
+
+def raw(live: Live, method: str, path: str, headers: dict, body: str | bytes) -> tuple[int, bytes]:
+    """Status and body of a request sent exactly as it is written, which no client would send."""
+    data = body.encode() if isinstance(body, str) else body
+    where = urlsplit(live.url)
+    sent = {"host": where.netloc, "content-length": str(len(data)), "connection": "close"} | headers
+    head = f"{method} {path} HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in sent.items()) + "\r\n"
+    with closing(socket.create_connection((where.hostname, where.port), timeout=PATIENCE_S)) as wire:
+        wire.sendall(head.encode() + data)
+        return answer(wire)
+
+
+def answer(wire: socket.socket) -> tuple[int, bytes]:
+    """Status and body of what the server says until it hangs up; status 0 when it says nothing."""
+    said = b""
+    with suppress(ConnectionResetError):
+        while part := wire.recv(65536):
+            said += part
+    head, _, body = said.partition(b"\r\n\r\n")
+    return (int(head.split()[1]) if head else 0), body
+
+
+# --- across sites -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", ["/api/scenes/session", "/scenes/guess"])
+@pytest.mark.parametrize("headers", [EVIL, {"origin": "null"}, {"host": "evil.example"}])
+def test_a_websocket_of_another_site_is_not_opened(live: Live, path: str, headers: dict[str, str]):
+    handshake = {"connection": "Upgrade", "upgrade": "websocket", "sec-websocket-version": "13"}
+    status, _ = raw(live, "GET", path, handshake | {"sec-websocket-key": "AAAAAAAAAAAAAAAAAAAAAA=="} | headers, "")
+    assert status == 403
+
+
+def test_no_answer_lets_another_site_read_it(live: Live):
+    for path in ("/", "/api/jobs", "/api/openapi.json", "/metrics", "/static/index.html"):
+        headers = live.http.get(path, headers=EVIL).headers
+        assert not [name for name in headers if name.startswith("access-control-")]
+        assert headers["cross-origin-resource-policy"] == "same-origin"
+        assert headers["x-content-type-options"] == "nosniff"
+        assert "object-src 'none'" in headers["content-security-policy"]
+        assert "unsafe-inline" not in headers["content-security-policy"].split("style-src")[0]
+
+
+# --- slowly, or too much ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def walled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    """A server as it is when bound elsewhere, and impatient; without waiting for its workers."""
+    settings = Settings(
+        data=tmp_path_factory.mktemp("walled"), port=0, workers=1, token=TOKEN, slowest_head_s=0.3, slowest_body_s=0.3
+    )
+    yield from start(settings, ready=lambda _: True)
+
+
+@pytest.mark.parametrize("head", [b"", b"GET / HT", b"GET / HTTP/1.1\r\nhost: localhost\r\nx-slow: "])
+def test_a_client_that_never_ends_its_head_is_hung_up_on(walled: Live, head: bytes):
+    where = urlsplit(walled.url)
+    with closing(socket.create_connection((where.hostname, where.port), timeout=PATIENCE_S)) as wire:
+        wire.sendall(head)
+        assert answer(wire)[0] == 0
+
+
+def test_neither_a_second_head_on_the_same_connection(walled: Live):
+    where = urlsplit(walled.url)
+    with closing(socket.create_connection((where.hostname, where.port), timeout=PATIENCE_S)) as wire:
+        wire.sendall(b"GET /api/health/live HTTP/1.1\r\nhost: localhost\r\n\r\nGET / HT")
+        assert answer(wire)[0] == 200
+
+
+def test_a_client_that_never_ends_its_body_is_told_and_hung_up_on(walled: Live):
+    headers = {"authorization": f"Bearer {TOKEN}", "content-length": "1000"} | JSON
+    assert raw(walled, "POST", "/api/jobs", headers, '{"scenario":')[0] == 408
+
+
+def test_a_head_without_end_is_refused(live: Live):
+    assert raw(live, "GET", "/", {"x-long": "x" * 200_000}, "")[0] in (0, 400, 431)
+
+
+def test_a_websocket_message_too_long_ends_the_session(live: Live):
+    with connect(f"{live.ws}/api/scenes/session", origin=live.url, max_size=None) as wire:
+        wire.send("x" * 100_000)
+        with pytest.raises(ConnectionClosed) as ended:
+            wire.recv(timeout=PATIENCE_S)
+    assert ended.value.rcvd is not None and ended.value.rcvd.code == 1009
+
+
+def test_websockets_inflate_nothing(live: Live):
+    with connect(f"{live.ws}/api/scenes/session", origin=live.url, compression="deflate") as wire:
+        assert not wire.protocol.extensions
+
+
+# --- without the token --------------------------------------------------------------------------------------------
+
+PATHS = ["/", "/api/jobs", "/api/openapi.json", "/api/health", "/metrics", "/static/index.html", "/scenes/x/"]
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_without_the_token_nothing_is_told(walled: Live, path: str):
+    assert httpx.get(walled.url + path).status_code == 401
+    assert httpx.get(walled.url + path, headers={"authorization": "Basic eDp5"}).status_code == 401
+    assert httpx.get(walled.url + path, cookies={f"coopnav-{urlsplit(walled.url).port}": TOKEN}).status_code == 401
+
+
+def test_without_the_token_no_websocket_is_opened_and_nothing_is_changed(walled: Live):
+    with pytest.raises(InvalidStatus), connect(f"{walled.ws}/api/scenes/session"):
+        pass
+    with pytest.raises(InvalidStatus), connect(f"{walled.ws}/api/scenes/session?token={TOKEN}"):
+        pass
+    assert httpx.post(f"{walled.url}/api/jobs?token={TOKEN}", json=SHORT).status_code == 401
+
+
+def test_the_token_works_once_in_an_address_and_then_as_a_cookie(walled: Live):
+    with httpx.Client(base_url=walled.url) as browser:
+        first = browser.get(f"/?token={TOKEN}&job=1")
+        assert first.status_code == 303 and first.headers["location"] == "/?job=1"
+        assert TOKEN not in str(first.headers)
+        assert browser.get("/").status_code == 200
+        cookie = first.headers["set-cookie"].partition(";")[0]
+    with connect(f"{walled.ws}/api/scenes/session", additional_headers={"cookie": cookie}):
+        pass
+
+
+def test_the_token_does_not_send_its_user_to_another_site(walled: Live):
+    for path in ("//evil.example", "/\\evil.example", "//evil.example/%2e%2e"):
+        answered = httpx.get(f"{walled.url}{path}?token={TOKEN}")
+        assert answered.status_code in (303, 404)
+        assert urlsplit(answered.headers.get("location", "/").replace("\\", "/")).netloc == ""
+
+
+def test_guessing_the_token_is_slowed_down_while_those_inside_go_on(walled: Live):
+    with httpx.Client(base_url=walled.url) as browser:
+        browser.get(f"/?token={TOKEN}")
+        answers = [httpx.get(f"{walled.url}/?token=guess{n}").status_code for n in range(FREE + 5)]
+        assert answers[:FREE] == [401] * FREE and set(answers[FREE:]) == {429}
+        late = httpx.get(f"{walled.url}/?token={TOKEN}")
+        assert late.status_code == 429 and int(late.headers["retry-after"]) > 0
+        assert browser.get("/").status_code == 200
+
+
+# --- inside ports -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def pane(live: Live) -> Iterator[int]:
+    """The inner port of an open pane."""
+    job = live.done(SHORT)["id"]
+    with connect(f"{live.ws}/api/scenes/session", origin=live.url) as wire:
+        wire.send(f'{{"type": "show", "job": "{job}", "panes": ["cekf"]}}')
+        (found,) = until(lambda: list(live.app.state.site.scenes.panes.values()), "the pane")
+        yield found.port
+
+
+@pytest.mark.parametrize("secret", [{}, {inner.HEADER: "guess"}, {inner.HEADER: ""}])
+def test_a_panes_inner_port_answers_to_nobody_but_the_relay(pane: int, secret: dict[str, str]):
+    assert httpx.get(f"http://127.0.0.1:{pane}/", headers=secret).status_code == 403
+    protocol = f"viser-v{viser.__version__}"
+    with (
+        pytest.raises(InvalidStatus) as refused,
+        connect(f"ws://127.0.0.1:{pane}/", subprotocols=[protocol], additional_headers=secret),  # type: ignore[list-item]
+    ):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+def test_a_viewer_gets_no_share_tunnel_even_when_its_request_hides_in_a_camera_message():
+    """That the plain request does not get through is tested with the panes."""
+    request = {"type": "ShareUrlRequest"}
+    for disguise in (request, [request], {"type": "ViewerCameraMessage", "type ": "ShareUrlRequest"}):
+        assert not relay.permitted(msgspec.msgpack.encode(disguise))
+    twice = [msgspec.msgpack.encode(word) for word in ("type", "ViewerCameraMessage", "type", "ShareUrlRequest")]
+    assert not relay.permitted(b"\x82" + b"".join(twice))
+
+
+def test_dasks_ports_talk_to_nobody_without_this_runs_certificate(live: Live):
+    """What they are sent is unpickled: whoever could talk to them could run code."""
+    cluster = live.app.state.site.cluster
+    addresses = [cluster.client.scheduler.address, *cluster.threads]
+    stranger = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    stranger.check_hostname, stranger.verify_mode = False, ssl.CERT_NONE
+    for address in addresses:
+        assert address.startswith("tls://127.0.0.1:")
+        where = ("127.0.0.1", int(address.rpartition(":")[2]))
+        with closing(socket.create_connection(where, timeout=PATIENCE_S)) as wire, pytest.raises(OSError):
+            secured = stranger.wrap_socket(wire)
+            secured.sendall(b"x")
+            if not secured.recv(1):
+                raise ConnectionResetError
+
+
+# --- files --------------------------------------------------------------------------------------------------------
+
+
+def test_a_link_among_the_saved_scenarios_is_not_followed(live: Live, tmp_path: Path):
+    text = live.http.get("/api/scenarios/first-look").json()["toml"]
+    outside = tmp_path / "private.toml"
+    outside.write_text(text)
+    shelf = live.settings.data / "scenarios"
+    shelf.mkdir(exist_ok=True)
+    (shelf / "linked.toml").symlink_to(outside)
+    try:
+        assert live.http.get("/api/scenarios/linked").status_code == 404
+        assert "linked" not in {entry["name"] for entry in live.http.get("/api/scenarios").json()}
+        assert live.http.put("/api/scenarios/linked", content=text + "\n", headers=TOML).status_code in (200, 201)
+        assert outside.read_text() == text and not (shelf / "linked.toml").is_symlink()
+    finally:
+        (shelf / "linked.toml").unlink()
+
+
+class Bomb:
+    """A pickle of this runs code when it is read."""
+
+    def __reduce__(self):
+        return (pytest.fail, ("a pickle was read",))
+
+
+def test_a_shards_file_with_a_pickle_in_it_is_not_read(tmp_path: Path):
+    hidden = io.BytesIO()
+    np.savez(hidden, meta=np.array([Bomb()], dtype=object))
+    (tmp_path / "shard.npz").write_bytes(hidden.getvalue())
+    with pytest.raises(ValueError, match="allow_pickle"):
+        artifacts.read_shard(tmp_path / "shard.npz")
