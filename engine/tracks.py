@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,10 @@ class Series:
 
 @dataclass(frozen=True)
 class Tracks:
-    """One algorithm's answer for a block of trials at the mission's report times."""
+    """One algorithm's answer for a block of trials at the mission's report times.
+
+    graph is what an estimator that keeps a factor graph has to tell of its first trial, in JSON's own types.
+    """
 
     beliefs: dict[str, Belief]
     packets: PacketCount = field(default_factory=PacketCount)
@@ -84,6 +88,7 @@ class Tracks:
     series: dict[str, Series] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     cpu_s: float = 0.0
+    graph: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -140,4 +145,5 @@ def stack(blocks: list[Tracks]) -> Tracks:
         },
         notes=tuple(dict.fromkeys(n for b in blocks for n in b.notes)),
         cpu_s=sum(b.cpu_s for b in blocks),
+        graph=first.graph,
     )

@@ -18,9 +18,14 @@ import numpy as np
 from engine.evaluation.result import Result
 from engine.runner import Shard
 from engine.tracks import Belief, Innovations, PacketCount, Reference, Samples, Series, Tracks
-from server.wire import plain
+from server.wire import dumps, plain
 
 RESULT, ARRAYS, VERSIONS = "result.json", "arrays.npz", "versions.json"
+
+
+def graph_file(algorithm: str) -> str:
+    """The name of the file with the factor graphs and broadcasts of an algorithm that tells of them."""
+    return f"graph-{algorithm}.json"
 
 
 def sha256(path: Path) -> str:
@@ -80,6 +85,9 @@ def write_result(directory: Path, result: Result) -> None:
     directory.mkdir(parents=True, exist_ok=True)
     write_json(directory / VERSIONS, versions())
     write_arrays(directory / ARRAYS, result.arrays())
+    for name, tracks in result.tracks.items():
+        if tracks.graph:
+            write_text(directory / graph_file(name), dumps(tracks.graph))
     write_json(directory / RESULT, result.to_json())
 
 
@@ -97,6 +105,7 @@ def write_shard(path: Path, shard: Shard, reference: Reference, tracks: Tracks) 
         "packets": asdict(tracks.packets),
         "notes": list(tracks.notes),
         "cpu_s": tracks.cpu_s,
+        "graph": tracks.graph,
     }
     for n, value in enumerate(reference.truth.values()):
         arrays[f"truth/{n}"] = value
@@ -133,5 +142,6 @@ def read_shard(path: Path) -> tuple[Shard, Reference, Tracks]:
         },
         notes=tuple(meta["notes"]),
         cpu_s=meta["cpu_s"],
+        graph=meta.get("graph", {}),
     )
     return Shard(meta["algorithm"], tuple(meta["trials"])), reference, tracks

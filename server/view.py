@@ -57,6 +57,7 @@ def _algorithm(name: str, parts: Parts, keep: np.ndarray) -> dict[str, Any]:
         "subjects": {s: _subject(reference.truth.get(s), belief, keep, first) for s, belief in tracks.beliefs.items()},
         "series": {key: _series(series, keep) for key, series in tracks.series.items()},
         "notes": list(tracks.notes),
+        "graph": first and bool(tracks.graph),
     }
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,13 +17,17 @@ from engine.navigation.network import members
 from engine.navigation.ranging import horizontal_range
 from engine.registry import Algorithm, Progress
 from engine.smoothing.ambiguity import WIDE_M, Judged, likeliest, starts
+from engine.smoothing.band import BandInverse
 from engine.smoothing.composition import oplus
+from engine.smoothing.diary import NOTHING
 from engine.smoothing.graph import Gaussians, Graph, Ranges, priors
 from engine.smoothing.smoother import Solution
+from engine.smoothing.story import ANYONE, Sketch
 from engine.smoothing.trajectory import (
     Links,
     PoseChain,
     link_factors,
+    pieces,
     pose_chain,
     pose_factors,
     row,
@@ -223,6 +228,44 @@ class Centralized:
                     found.append((r, value))
         return found
 
+    def told(self, numbering: Numbering, solution: Solution, inverse: BandInverse) -> dict[str, Any]:
+        """The first trial's graph, as `story` tells it: the poses that ranges touch, and what ties them."""
+        sketch, heard = Sketch(), self.heard(0)
+        names = [v.name for v in self.mission.log.vehicles]
+        touched: list[set[int]] = [set() for _ in names]
+        for r, _ in heard:
+            touched[r.arrival.vehicle].add(r.heard_at)
+            touched[r.arrival.sender].add(r.sent_at)
+        place: dict[tuple[int, int], int] = {}
+        for v, chain in enumerate(self.mission.chains):
+            still, before = chain.initial.mean.shape[-1] == 2, None
+            for n in sorted(touched[v])[: 1 if still else None]:
+                idx = numbering.idx[v][n, :2]
+                at = solution.x[idx]
+                prior = still or self._fixed(v, before or 0, n)
+                here = sketch.pose(chain.times_s[n], names[v], None, at, idx=idx, prior=prior, kind="own")
+                place |= {(v, k): here for k in touched[v]} if still else {(v, n): here}
+                if still:
+                    sketch.still.add(here)
+                elif before is not None:
+                    sketch.odometry.append((here - 1, here, 0))
+                before = n
+        used = solution.weights[0] > 0 if heard else []
+        for (r, _), mine in zip(heard, used):
+            ends = place[r.arrival.vehicle, r.heard_at], place[r.arrival.sender, r.sent_at]
+            sketch.ranges.append((*ends, bool(mine)))
+        chosen, idx = sketch.sample()
+        blocks = inverse.blocks(idx) if chosen else []
+        return {"broadcasts": [], "graphs": {ANYONE: sketch.told(dict(zip(chosen, blocks)))}}
+
+    def _fixed(self, vehicle: int, first: int, last: int) -> bool:
+        """Whether a vehicle had a fix between two of its breakpoints, in the first trial."""
+        links = self.linear[vehicle]
+        if links is None:
+            steps = self.mission.chains[vehicle].steps[first:last]
+            return any(piece.fix is not None for step in steps for piece in pieces(step))
+        return bool(np.abs(links.of(0).J[first:last, :2, :2]).max(initial=0.0) > NOTHING)
+
     def _ranges(self, trial: int, numbering: Numbering) -> tuple[Ranges, ...]:
         heard = self.heard(trial)
         if not heard:
@@ -252,7 +295,7 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
     pairs = [(i, j) for n, i in enumerate(moving) for j in moving[n + 1 :]]
     correlation = {pair: np.zeros((trials, T)) for pair in pairs}
     ranges = _RangeRecord(centralized.receptions, trials)
-    unsettled, ambiguous, refused = [], [], 0
+    unsettled, ambiguous, refused, graph_told = [], [], 0, {}
     for trial in range(trials):
         numbering, graph, judged = centralized.solve(trial)
         solution = judged.solution
@@ -266,6 +309,8 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
             both = np.concatenate([numbering.idx[i][at[i], :2], numbering.idx[j][at[j], :2]], axis=1)
             correlation[i, j][trial] = _correlation(inverse.blocks(both))
         ranges.note(trial, centralized, graph, solution, inverse)
+        if trial == 0:
+            graph_told = centralized.told(numbering, solution, inverse)
         if solution.status != "converged":
             unsettled.append(trial)
         refused += sum(int((w == 0).sum()) for w in solution.weights)
@@ -291,6 +336,7 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
         },
         notes=tuple(notes),
         cpu_s=time.process_time() - started,
+        graph=graph_told,
     )
 
 

@@ -18,11 +18,13 @@ from engine.navigation.chains import Step
 from engine.navigation.mission import Arrival, Launch, NavigationMission
 from engine.navigation.network import Member, Packet, members, run_nodes
 from engine.registry import Progress
+from engine.smoothing.diary import told_by
 from engine.smoothing.fleet import launches_of
 from engine.smoothing.local_chain import LocalChain, local_chain
 from engine.smoothing.node import SmootherNode
 from engine.smoothing.reconstruction import ReceivedChain, target
 from engine.smoothing.refactor import divergence
+from engine.smoothing.story import heard_story
 from engine.tracks import Series, Tracks
 
 
@@ -47,16 +49,19 @@ class Listener:
         self.node.now = advance(self.node.now, slice(None), step.at(self.node.now.mean))
 
     def transmit(self, launch: Launch) -> Packet:
-        return Packet(self.node.broadcast(launch), self.node.floats)
+        return Packet(self.node.say(launch), self.node.floats)
 
     def receive(self, arrival: Arrival, data: np.ndarray) -> None:
         opened = self.node.open(arrival.sender, data)
         for trial in np.flatnonzero(np.isfinite(arrival.slant_m) & opened.valid):
             chain = self.chains[trial].setdefault(arrival.sender, ReceivedChain())
+            told = told_by(chain) if trial == 0 else {}
             for number, link in opened.links(int(trial)):
                 chain.add(number, link)
             heard = self.launches[trial].setdefault(arrival.sender, [])
             heard.append((arrival.index, int(opened.sequence[trial])))
+            if trial == 0:
+                self.node.diary.note(arrival, int(opened.sequence[0]), told, chain)
 
     def belief(self) -> Moments:
         return self.node.belief()
@@ -109,7 +114,9 @@ def reconstruct(mission: NavigationMission, progress: Progress, make: Callable[[
             curve = np.full((mission.trials, T), np.nan)
             curve[:, -1] = values[:, column]
             series[f"{what}/{name}"] = Series(f"{title} {name}", unit, curve, (name,))
-    return replace(tracks, series=tracks.series | series)
+    heard = [{v: [pose for _, pose in found] for v, found in who.launches[0].items()} for who in listeners]
+    graph = heard_story(mission, [who.node for who in listeners], tracks, [who.chains[0] for who in listeners], heard)
+    return replace(tracks, series=tracks.series | series, graph=graph)
 
 
 def curves(

@@ -180,6 +180,13 @@ class Growing:
             if self._step(min(since, self.changed)) < SETTLED_M:
                 break
 
+    def settle(self, steps: int = STEPS) -> None:
+        """Gauss-Newton steps with everything linearized anew, for the smoothed estimate of all there is."""
+        for _ in range(steps):
+            self._linearize(0)
+            if self._step(0) < SETTLED_M:
+                break
+
     def _linearize(self, p: int) -> None:
         """Linearize anew, at the present estimate, the factors all of whose unknowns are not before p."""
         z = np.concatenate([self.x[: self.n], self.border_x])

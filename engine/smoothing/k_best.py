@@ -5,11 +5,11 @@ from __future__ import annotations
 from pydantic import BaseModel, ConfigDict, Field
 
 from engine.navigation.mission import NavigationMission
-from engine.navigation.network import run_nodes
 from engine.registry import Algorithm, Progress
 from engine.smoothing.fidelity import reconstruct
 from engine.smoothing.fleet import make_nodes
 from engine.smoothing.sender import choose_best
+from engine.smoothing.story import smooth
 from engine.tracks import Tracks
 
 
@@ -31,7 +31,7 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
     options = Options(**mission.options.get("k_best", {}))
     choose = choose_best(options.loss)
     make = make_nodes(mission, options.k, choose, consistent=options.consistent)
-    return reconstruct(mission, progress, make) if options.reconstruct_only else run_nodes(mission, progress, make)
+    return (reconstruct if options.reconstruct_only else smooth)(mission, progress, make)
 
 
 K_BEST = Algorithm(

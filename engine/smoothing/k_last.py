@@ -5,11 +5,11 @@ from __future__ import annotations
 from pydantic import BaseModel, ConfigDict, Field
 
 from engine.navigation.mission import NavigationMission
-from engine.navigation.network import run_nodes
 from engine.registry import Algorithm, Progress
 from engine.smoothing.fidelity import reconstruct
 from engine.smoothing.fleet import make_nodes
 from engine.smoothing.sender import choose_last
+from engine.smoothing.story import smooth
 from engine.tracks import Tracks
 
 
@@ -29,7 +29,7 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
     """Run k-last on a mission with the scenario's options."""
     options = Options(**mission.options.get("k_last", {}))
     make = make_nodes(mission, options.k, choose_last, consistent=options.consistent)
-    return reconstruct(mission, progress, make) if options.reconstruct_only else run_nodes(mission, progress, make)
+    return (reconstruct if options.reconstruct_only else smooth)(mission, progress, make)
 
 
 K_LAST = Algorithm(

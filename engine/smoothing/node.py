@@ -21,6 +21,7 @@ from engine.navigation.ranging import Innovation, horizontal_range
 from engine.smoothing.band import NotPositiveDefinite
 from engine.smoothing.composition import Relation, decompose, oplus
 from engine.smoothing.composition import compose as then
+from engine.smoothing.diary import NOTHING, Diary, OwnPose, Sent, told_by
 from engine.smoothing.growing import BORDER, Growing
 from engine.smoothing.packets import NONE
 from engine.smoothing.reconstruction import Received, ReceivedChain, open_packet
@@ -61,6 +62,7 @@ class SmootherNode:
         self.heard: list[dict[int, Heard]] = [{} for _ in range(member.trials)]
         self.own: list[np.ndarray | None] = [None] * member.trials
         self.lost_ranges = 0
+        self.diary, self.time_s = Diary(), 0.0
 
     def _graph(self, trial: int) -> Growing:
         """Border: positions of fixed nodes, one's own if one is fixed, and the sound-speed error."""
@@ -100,7 +102,14 @@ class SmootherNode:
                 self.turned = moved if self.turned is None else then(self.turned, moved)
 
     def transmit(self, launch: Launch) -> Packet:
-        return Packet(self.broadcast(launch), self.floats)
+        self.time_s = launch.time_s
+        return Packet(self.say(launch), self.floats)
+
+    def say(self, launch: Launch) -> np.ndarray:
+        """Bytes (trials, n) of the next packet, noted in the diary."""
+        data = self.broadcast(launch)
+        self.diary.sent.append(Sent(launch.index, launch.time_s, data[0].copy()))
+        return data
 
     def broadcast(self, launch: Launch) -> np.ndarray:
         """Bytes (trials, n) of the next packet."""
@@ -114,13 +123,26 @@ class SmootherNode:
         value, variance = np.full(trials, np.nan), np.full(trials, np.nan)
         accepted = np.zeros(trials, bool)
         opened = self.open(arrival.sender, data)
+        self.time_s = arrival.time_s
         for trial in np.flatnonzero(np.isfinite(arrival.slant_m) & opened.valid):
             difference = arrival.depth_m[min(trial, len(arrival.depth_m) - 1)] - opened.depth_m[trial]
             range_m = float(horizontal_range(arrival.slant_m[trial], difference))
+            told = told_by(self._known(arrival.sender)) if trial == 0 else {}
             seen = self._take(int(trial), arrival.sender, opened, range_m)
             if seen is not None:
                 value[trial], variance[trial], accepted[trial] = seen
+            if trial == 0:
+                self.diary.note(arrival, int(opened.sequence[0]), told, self._known(arrival.sender), seen)
         return Innovation(value, variance, accepted)
+
+    def _known(self, sender: int) -> ReceivedChain | None:
+        """What the first trial has of a sender's chain."""
+        heard = self.heard[0].get(sender)
+        return None if heard is None else heard.chain
+
+    def spoken_s(self) -> np.ndarray:
+        """Times of the own poses that packets number, so far."""
+        return np.array([sent.time_s for sent in self.diary.sent])
 
     def open(self, sender: int, data: np.ndarray):
         """Decode a packet of that sender."""
@@ -206,6 +228,9 @@ class SmootherNode:
     def _own_done(self, trial: int, idx: np.ndarray) -> None:
         """The next own pose counts from this one."""
         self.own[trial] = idx
+        if trial == 0:
+            fixed = self.since is not None and bool(self.since.J[0, XY, XY].max() > NOTHING)
+            self.diary.own.append(OwnPose(self.time_s, idx, fixed))
         if self.since is None:
             return
         n = self.size
@@ -231,9 +256,12 @@ class SmootherNode:
             return self._pose_launch(graph, sender, mine, now, changed)
         return self._plane_launch(graph, sender, mine, now, changed)
 
+    def border_of(self, sender: int) -> np.ndarray:
+        """The unknowns of a fixed node's position."""
+        return BORDER + 2 * self.fixed.index(sender) + np.arange(2)
+
     def _fixed_pose(self, graph: Growing, sender: int, opened, trial: int) -> np.ndarray:
-        place = self.fixed.index(sender)
-        idx = BORDER + 2 * place + np.arange(2)
+        idx = self.border_of(sender)
         mean, L = opened.values["new.z"][trial], np.linalg.inv(opened.values["new.R"][trial])
         if ("fixed", sender) not in graph.kept:
             graph.border_reference[idx - BORDER] = graph.border_x[idx - BORDER] = mean

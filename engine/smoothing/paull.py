@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from engine.mission.log import Fixes, VehicleLog
 from engine.navigation.chains import chain as compress_log
 from engine.navigation.mission import Arrival, Launch, NavigationMission
-from engine.navigation.network import Member, Packet, run_nodes
+from engine.navigation.network import Member, Packet
 from engine.navigation.ranging import Innovation, horizontal_range
 from engine.registry import Algorithm, Progress
 from engine.smoothing import packets
@@ -27,6 +27,7 @@ from engine.smoothing.node import Heard, Sender, SmootherNode
 from engine.smoothing.packets import NONE, OLDEST
 from engine.smoothing.reconstruction import Received, ReceivedChain
 from engine.smoothing.sender import PlaneSender, choose_last
+from engine.smoothing.story import smooth
 from engine.tracks import Tracks
 
 #: A fix nearer (s) to another pose than this is not made a pose of its own: too little happens in between.
@@ -69,11 +70,12 @@ def packet_size(vehicles: int, priors: int = 1) -> dict[str, int]:
 class Poses:
     """The poses a vehicle may speak of, in order of time: its odometry alone composed to each, and single fixes.
 
-    of_launch (K,) and of_arrival {time: pose} number them; fixes[k] are (pose, fix number) of the window before launch
-    k, the latest first.
+    times_s (N,) are theirs; of_launch (K,) and of_arrival {time: pose} number them; fixes[k] are (pose, fix number) of
+    the window before launch k, the latest first.
     """
 
     sender: PlaneSender
+    times_s: np.ndarray
     of_launch: np.ndarray
     of_arrival: dict[float, int]
     fixes: list[list[tuple[int, int]]]
@@ -94,6 +96,7 @@ def poses_of(mission: NavigationMission, vehicle: int, log: VehicleLog, priors: 
     place = {float(t): n for n, t in enumerate(times)}
     return Poses(
         PlaneSender(vehicle, chain, mission.trials, 0, choose_last),
+        times,
         np.array([place[float(t)] for t in launches], int),
         {float(t): place[float(t)] for t in arrivals if float(t) in place},
         [
@@ -158,7 +161,11 @@ class PaullNode(SmootherNode):
         """The other vehicles, in the order of the slots of that vehicle's packets."""
         return [v for v in range(len(self.member.sizes)) if v != vehicle]
 
+    def spoken_s(self) -> np.ndarray:
+        return super().spoken_s() if self.poses is None else self.poses.times_s
+
     def transmit(self, launch: Launch) -> Packet:
+        self.time_s = launch.time_s
         if self.poses is not None:
             pose = int(self.poses.of_launch[self.launches])
             for trial in range(self.member.trials):
@@ -325,7 +332,7 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
     """Run Paull's method on a mission with the scenario's options."""
     options = Options(**mission.options.get("paull", {}))
     make = make_nodes(mission, options)
-    return reconstruct(mission, progress, make) if options.reconstruct_only else run_nodes(mission, progress, make)
+    return (reconstruct if options.reconstruct_only else smooth)(mission, progress, make)
 
 
 PAULL = Algorithm(
