@@ -7,12 +7,13 @@ import { mountMissions } from "./library/missions.js";
 import { mountPreview } from "./library/preview.js";
 import { part } from "./look/dom.js";
 import { mountNotices } from "./notices.js";
+import { mountRooms } from "./rooms.js";
 import { mountRuns } from "./runs/runs.js";
+import { mountSide } from "./side.js";
 import { clock } from "./state/clock.js";
 import { suspect } from "./state/connection.js";
 import { pickAgain, readLibrary } from "./state/library.js";
-import { readLink, writeLink } from "./state/link.js";
-import { closeRun, openRun } from "./state/run.js";
+import { mountLink } from "./state/link.js";
 import { store } from "./state/store.js";
 import { mountStudies } from "./studies/studies.js";
 import { mountTabs } from "./tabs.js";
@@ -26,9 +27,8 @@ import { mountTable } from "./workbench/table.js";
 import { mountTimeline } from "./workbench/timeline.js";
 import { mountToolbar } from "./workbench/toolbar.js";
 
-/** The address is written at most this often while time runs. */
-const LINK_PAUSE_MS = 400;
-
+mountRooms();
+mountSide();
 mountTabs();
 mountNotices();
 mountMissions();
@@ -53,7 +53,7 @@ mountClaims();
 mountRuns();
 listenKeys(window);
 
-store.watch(["run"], ({ run }) => (part("workbench").hidden = run === null));
+store.watch(["run", "room"], ({ run, room }) => (part("workbench").hidden = run === null || room !== "workbench"));
 
 let shown = null;
 store.watch(["job"], ({ job }) => {
@@ -71,25 +71,5 @@ clock.watch(() => {
   if (shown !== null && clock.end > clock.start && !clock.following) session.seek(clock.time);
 });
 
-let writing = 0;
-const write = () => {
-  writing ||= setTimeout(() => {
-    writing = 0;
-    const { run, vehicle } = store.state;
-    if (run === null || store.state.view) writeLink({ run, time_s: clock.following ? null : clock.time, vehicle });
-    else if (readLink().run !== run) writeLink({ run, time_s: null, vehicle });
-  }, LINK_PAUSE_MS);
-};
-clock.watch(write);
-
-function followLink() {
-  const { run, time_s, vehicle } = readLink();
-  if (run && run !== store.state.run) openRun(run, { time_s, vehicle });
-  else if (!run && store.state.run !== null) closeRun();
-  else if (run && time_s !== null) clock.seek(time_s);
-}
-window.addEventListener("hashchange", followLink);
-followLink();
-store.watch(["run", "vehicle", "view"], write);
-
+mountLink();
 await readLibrary();

@@ -1,4 +1,4 @@
-// What the person must know: the server lost, and messages about the open run.
+// What the person must know: the server lost, messages about the open run, what was just done and can be undone.
 
 import { el, part } from "./look/dom.js";
 import { store } from "./state/store.js";
@@ -12,6 +12,12 @@ export function mountNotices() {
     lost.textContent = connected ? "" : "The server does not answer. What you see stays; trying again…";
     status.textContent = connected ? (was ? "" : "connected again") : "";
     was = connected;
+  });
+
+  const done = part("done");
+  store.watch(["done"], (state) => {
+    const { text, act } = state.done ?? {};
+    done.replaceChildren(...(text ? [el("span", {}, text), el("button", { type: "button", class: "small", onclick: act.run }, act.label)] : []));
   });
 
   const room = part("notices");

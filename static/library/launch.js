@@ -5,11 +5,12 @@ import { atWork, cancelRun, startRun } from "../state/run.js";
 import { store } from "../state/store.js";
 import { lossShort } from "./facts.js";
 
+const LOSS = "network.loss";
 /** Fields by the key the server knows them under. */
 const FIELDS = {
   trials: { label: "Trials", hint: "How many times the mission is flown, each with noise of its own" },
   seed: { label: "Seed", hint: "Same scenario, seed and version: the same numbers" },
-  "network.loss": { label: "Packet loss", hint: "Fraction of packets lost, 0 to 1; empty leaves the mission's own" },
+  [LOSS]: { label: "Packet loss", hint: "Fraction of packets lost, 0 to 1; empty leaves the mission's own" },
 };
 
 export function mountLaunch() {
@@ -20,7 +21,7 @@ export function mountLaunch() {
       id: `field-${key}`,
       name: key,
       type: "text",
-      inputmode: key === "network.loss" ? "decimal" : "numeric",
+      inputmode: key === LOSS ? "decimal" : "numeric",
       autocomplete: "off",
       spellcheck: "false",
       title: hint,
@@ -30,7 +31,8 @@ export function mountLaunch() {
   const run = el("button", { type: "submit", class: "primary", id: "run" }, "Run");
   const cancel = el("button", { type: "button", id: "cancel", onclick: cancelRun, hidden: true }, "Cancel");
   const why = el("div", { class: "refusal", role: "alert", id: "refusal", hidden: true });
-  part("launch").append(el("div", { class: "fields" }, fields), el("div", { class: "buttons" }, run, cancel), why);
+  const others = el("ul", { class: "varied", "aria-label": "Also changed in the mission" });
+  part("launch").append(el("div", { class: "fields" }, fields), others, el("div", { class: "buttons" }, run, cancel), why);
 
   const ready = ({ ticked, mission, missions }) => {
     const available = missions?.find((m) => m.name === mission)?.available;
@@ -53,16 +55,18 @@ export function mountLaunch() {
     }
   });
 
-  store.watch(["mission", "missions"], ({ mission, missions }) => {
-    const trials = missions?.find((m) => m.name === mission)?.trials;
+  store.watch(["mission", "missions", "varied"], ({ mission, missions, varied }) => {
+    const trials = varied.trials ?? missions?.find((m) => m.name === mission)?.trials;
     inputs.trials.value = trials ? String(trials) : "";
-    inputs.seed.value = "";
-    inputs["network.loss"].value = "";
+    inputs.seed.value = varied.seed === null ? "" : String(varied.seed);
+    inputs[LOSS].value = typeof varied.changes[LOSS] === "number" ? String(varied.changes[LOSS]) : "";
+    others.replaceChildren(...Object.entries(beyondFields(varied.changes)).map(change));
+    others.hidden = !others.children.length;
   });
   store.watch(["scenario"], ({ scenario }) => {
     inputs.seed.placeholder = scenario?.seed === undefined ? "" : String(scenario.seed);
-    inputs["network.loss"].placeholder = scenario?.network ? lossShort(scenario.network) : "";
-    inputs["network.loss"].closest("label").hidden = scenario !== null && !scenario.network;
+    inputs[LOSS].placeholder = scenario?.network ? lossShort(scenario.network) : "";
+    inputs[LOSS].closest("label").hidden = scenario !== null && !scenario.network;
   });
   store.watch(["ticked", "mission", "missions"], ready);
   store.watch(["job"], ({ job }) => {
@@ -81,18 +85,32 @@ export function mountLaunch() {
 
 /** The job that the form describes; what is not a number goes as it was typed, for the server to refuse. */
 function submission(inputs) {
-  const { mission, ticked } = store.state;
-  const body = { scenario: mission, algorithms: ticked };
+  const { mission, ticked, varied } = store.state;
+  const body = { scenario: mission, algorithms: ticked, set: beyondFields(varied.changes) };
   const value = (key) => {
     const text = inputs[key].value.trim();
     return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
   };
   if (value("trials") !== "") body.trials = value("trials");
   if (value("seed") !== "") body.seed = value("seed");
-  if (value("network.loss") !== "" && !inputs["network.loss"].closest("label").hidden) {
-    body.set = { "network.loss": value("network.loss") };
-  }
+  if (value(LOSS) !== "" && !inputs[LOSS].closest("label").hidden) body.set[LOSS] = value(LOSS);
   return body;
+}
+
+/** Changes that no field of the form shows. */
+function beyondFields(changes) {
+  return Object.fromEntries(Object.entries(changes).filter(([key, value]) => key !== LOSS || typeof value !== "number"));
+}
+
+/** A change in the mission that an earlier run brought along, with a button that drops it. */
+function change([key, value]) {
+  const drop = () => {
+    const { varied } = store.state;
+    const changes = Object.fromEntries(Object.entries(varied.changes).filter(([other]) => other !== key));
+    store.set({ varied: { ...varied, changes } });
+  };
+  const told = typeof value === "object" ? JSON.stringify(value) : String(value);
+  return el("li", {}, el("code", {}, key), ` ${told}`, el("button", { type: "button", class: "small", "aria-label": `Leave ${key} as the mission has it`, onclick: drop }, "×"));
 }
 
 /** The field of a key path; validation below a key belongs to it. */

@@ -1,36 +1,62 @@
-// Earlier runs: to open again, or to delete.
+// Earlier runs: the latest beside the workbench, all of them, and their comparison, in a room of their own.
 
 import { el, part } from "../look/dom.js";
 import { ago, percent, plural } from "../look/format.js";
-import * as api from "../wire/api.js";
-import { persist } from "../state/connection.js";
-import { atWork, closeRun, openRun } from "../state/run.js";
+import { present, readRuns, removeRuns } from "../state/jobs.js";
+import { roomLink } from "../state/link.js";
+import { atWork, openRun } from "../state/run.js";
 import { store } from "../state/store.js";
+import { buildComparison } from "./compare.js";
+import { buildHistory } from "./history.js";
 
-/** A delete button asks once more, for this long. */
-const SURE_MS = 4000;
-
-/** Reads the list again. */
-export async function readRuns() {
-  store.set({ jobs: await persist(api.jobs) });
-}
+/** While runs are at work their list is read again this often. */
+const AGAIN_MS = 2000;
 
 export function mountRuns() {
-  const panel = part("panel-runs");
-  const counter = part("runs-count");
-  store.watch(["jobs", "run"], ({ jobs, run }) => {
-    counter.textContent = jobs?.length ? String(jobs.length) : "";
-    if (jobs === null) panel.replaceChildren(el("div", { class: "ghost mission" }), el("div", { class: "ghost mission" }));
-    else if (!jobs.length) panel.replaceChildren(el("p", { class: "quiet" }, "No runs yet. They are kept here when they have run."));
-    else panel.replaceChildren(el("ul", { class: "runs" }, jobs.map((job) => entry(job, job.id === run))));
-  });
+  mountLatest();
+  mountRoom();
   let known = null;
-  store.watch(["job"], ({ job }) => {
-    const now = job ? `${job.id} ${job.state}` : "";
+  store.watch(["job", "room"], ({ job, room }) => {
+    const now = `${job?.id} ${job?.state} ${room}`;
     if (now !== known) readRuns();
     known = now;
   });
   document.addEventListener("visibilitychange", () => document.hidden || readRuns());
+  let timer = 0;
+  store.watch(["jobs", "room"], ({ jobs, room }) => {
+    if (room === "workbench" || document.hidden || !jobs?.some(atWork)) return;
+    timer ||= setTimeout(() => {
+      timer = 0;
+      readRuns();
+    }, AGAIN_MS);
+  });
+}
+
+function mountRoom() {
+  const history = buildHistory();
+  const comparison = buildComparison();
+  part("runs-room").append(history.root, comparison.root);
+  store.watch(["room", "jobs", "leaving", "run", "algorithms", "compared"], ({ room, compared }) => {
+    history.root.hidden = compared.length > 1;
+    comparison.root.hidden = compared.length < 2;
+    if (room === "runs" && compared.length < 2) history.draw();
+  });
+}
+
+/** The list beside the workbench. */
+function mountLatest() {
+  const panel = part("panel-runs");
+  const counter = part("runs-count");
+  store.watch(["jobs", "leaving", "run"], (state) => {
+    const jobs = present(state);
+    counter.textContent = jobs?.length ? String(jobs.length) : "";
+    if (jobs === null) panel.replaceChildren(el("div", { class: "ghost mission" }), el("div", { class: "ghost mission" }));
+    else if (!jobs.length) panel.replaceChildren(el("p", { class: "quiet" }, "No runs yet. They are kept here when they have run."));
+    else {
+      const all = el("a", { class: "all", href: roomLink("runs") }, "Search, tag and compare all runs");
+      panel.replaceChildren(all, el("ul", { class: "runs" }, jobs.map((job) => entry(job, job.id === state.run))));
+    }
+  });
 }
 
 function entry(job, current) {
@@ -41,38 +67,15 @@ function entry(job, current) {
     el(
       "button",
       { type: "button", class: "open", "aria-current": current ? "true" : null, onclick: () => openRun(job.id, {}) },
-      el("span", { class: "title" }, job.title),
+      el("span", { class: "title" }, job.pinned ? "★ " : null, job.title),
       el(
         "span",
         { class: "about" },
         state ? el("span", { class: "state", "data-state": job.state }, state) : null,
         `${plural(job.algorithms.length, "estimator")} · ${plural(job.trials, "trial")} · ${ago(job.created_at)}`,
+        job.tags.map((tag) => el("span", { class: "tag" }, tag)),
       ),
     ),
-    remover(job),
+    el("button", { type: "button", class: "small remove", "aria-label": `Delete the run ${job.title}`, title: "Delete", onclick: () => removeRuns([job]) }, "×"),
   );
-}
-
-function remover(job) {
-  const button = el("button", { type: "button", class: "small remove", "aria-label": `Delete the run ${job.title}`, title: "Delete" }, "×");
-  button.addEventListener("click", async () => {
-    if (button.dataset.sure === undefined) {
-      button.dataset.sure = "";
-      button.textContent = atWork(job) ? "End and delete?" : "Delete?";
-      setTimeout(() => {
-        delete button.dataset.sure;
-        button.textContent = "×";
-      }, SURE_MS);
-      return;
-    }
-    button.disabled = true;
-    try {
-      await persist(() => api.remove(job.id));
-    } catch (error) {
-      if (!(error instanceof api.Problem) || error.status !== 404) throw error;
-    }
-    if (store.state.run === job.id) closeRun();
-    await readRuns();
-  });
-  return button;
 }

@@ -7,10 +7,16 @@ import { store } from "./store.js";
 
 const scenarios = new Map();
 
-/** Reads the library; picks the first mission that can run unless one is picked already. */
+/** What a new run varies where nobody has said anything. */
+const AS_IT_IS = { trials: null, seed: null, changes: {} };
+
+/** Reads the library; picks the mission asked for, else the first that can run, unless one is picked already. */
 export async function readLibrary() {
   const [missions, algorithms] = await Promise.all([persist(api.scenarios), persist(api.algorithms)]);
   store.set({ missions, algorithms });
+  store.watch(["asked"], ({ asked, mission }) => {
+    if (asked !== mission && missions.some((m) => m.name === asked && m.available)) pickMission(asked);
+  });
   if (store.state.mission === null) {
     const first = missions.find((m) => m.available);
     if (first) pickMission(first.name);
@@ -32,23 +38,21 @@ export function scenarioOf(name) {
   return scenarios.get(name);
 }
 
-/** Picks a mission, and ticks its own algorithms or the given ones. */
-export function pickMission(name, ticked = null) {
+/** Picks a mission as it is or varied, and ticks its own algorithms or the given ones. */
+export function pickMission(name, ticked = null, varied = AS_IT_IS) {
   const entry = store.state.missions?.find((m) => m.name === name);
   const fitting = fittingAlgorithms(entry).map((a) => a.name);
   const own = (ticked ?? entry?.algorithms ?? []).filter((a) => fitting.includes(a));
-  store.set({ mission: name, scenario: null, ticked: own.length ? own : fitting, refusal: null });
+  store.set({ mission: name, scenario: null, ticked: own.length ? own : fitting, varied, refusal: null });
   scenarioOf(name).then((scenario) => {
     if (store.state.mission === name) store.set({ scenario });
   });
 }
 
-/** Picks what a run that is opened was made of, so that it can be varied. */
+/** Picks what a run that is opened was made of, so that it can be varied and run again. */
 export function pickAgain(job) {
-  const { missions, mission, ticked } = store.state;
-  const known = missions?.some((m) => m.name === job.scenario && m.available);
-  const same = mission === job.scenario && job.algorithms.join() === ticked.join();
-  if (known && !same) pickMission(job.scenario, job.algorithms);
+  const known = store.state.missions?.some((m) => m.name === job.scenario && m.available);
+  if (known) pickMission(job.scenario, job.algorithms, { trials: job.trials, seed: job.seed, changes: job.changes });
 }
 
 /** Algorithms that can run a mission, in the registry's order. */

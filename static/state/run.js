@@ -19,7 +19,7 @@ export const atWork = (job) => job !== null && !FINAL.has(job.state);
 export async function openRun(id, wanted = {}, known = null) {
   open.abort();
   const { signal } = (open = new AbortController());
-  store.set({ run: id, job: null, progress: null, live: null, view: null, result: null, notices: [] });
+  store.set({ room: "workbench", run: id, job: null, progress: null, live: null, view: null, result: null, notices: [] });
   store.set({ vehicle: wanted.vehicle ?? store.state.vehicle });
   clock.reset(0, 0);
   try {

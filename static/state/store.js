@@ -34,13 +34,19 @@ export function createStore(initial) {
 }
 
 export const store = createStore({
+  /** What fills the stage: "workbench", "runs" or "claims"; and the runs that are compared there, by id. */
+  room: "workbench",
+  compared: [],
   /** Entries of the library and the installed algorithms; null until they have come. */
   missions: null,
   algorithms: null,
-  /** Name of the mission picked, its scenario once read, and the names of the ticked algorithms. */
+  /** Name of the mission a person asked for, of the mission picked, its scenario once read, and the ticked algorithms. */
+  asked: null,
   mission: null,
   scenario: null,
   ticked: [],
+  /** What a new run changes in its mission: trials and seed (null: the mission's own), and values by key path. */
+  varied: { trials: null, seed: null, changes: {} },
   /** The run that is open: its id from the address on, its job, view and result as they arrive. */
   run: null,
   job: null,
@@ -50,11 +56,14 @@ export const store = createStore({
   result: null,
   /** The subject that curves and readings are about. */
   vehicle: null,
-  /** Earlier runs, newest first; null until they have come. */
+  /** Earlier runs, newest first; null until they have come. And ids of those that are about to be deleted. */
   jobs: null,
+  leaving: new Set(),
   /** Whether the server answers. */
   connected: true,
   /** The last refusal of a submission (Problem), and messages about the open run [{tone, title, text, …}]. */
   refusal: null,
   notices: [],
+  /** What was just done, for a while: {text, act: {label, run}}; null for nothing. */
+  done: null,
 });

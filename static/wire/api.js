@@ -57,11 +57,19 @@ export const view = (id, signal) => request(`${job(id)}/view`, { signal });
 export const result = (id, signal) => request(`${job(id)}/result`, { signal });
 export const cancel = (id) => request(`${job(id)}/cancel`, { method: "POST" });
 export const remove = (id) => request(job(id), { method: "DELETE" });
+export const mark = (id, marks) => request(job(id), { method: "PATCH", body: marks });
+export const ranScenario = (id, signal) => request(`${job(id)}/scenario`, { signal });
+export const reportPath = (id) => `${job(id)}/report`;
 export const analyseTracking = (body, signal) => request("/api/tracking/analysis", { method: "POST", body, signal });
 export const trackingRegions = (body) => request("/api/tracking/regions", { method: "POST", body });
 export const tablePlan = () => request("/api/tables/walls2011-table-1");
 export const tableOf = (runs) => request("/api/tables/walls2011-table-1", { method: "POST", body: runs });
 export const eventsPath = (id) => `${job(id)}/events`;
+
+/** Deletes a job even while the page goes. */
+export function removeLast(id) {
+  fetch(job(id), { method: "DELETE", keepalive: true });
+}
 
 /** Submits a job; the key makes a repeated submission the same job. */
 export function submit(body, key) {

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from tests.browser.serving import Server
 
@@ -26,6 +26,8 @@ FLAGS = [
     "--disable-quic",
     "--disable-background-networking",
 ]
+# On a machine that is busy a page takes its time.
+expect.set_options(timeout=30_000)
 SIZE = {"width": 1280, "height": 720}
 #: A mission with two vehicles that takes a second or two.
 FIRST_LOOK = {"scenario": "first-look", "trials": 3, "algorithms": ["dead_reckoning", "cekf", "nekf"]}
