@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from engine.scenario.errors import Problem, ScenarioError
+from engine.scenario.pursuit import Recorded
 from engine.scenario.recording import CsvRecording, PyfgRecording
 
 DATA_VARIABLE = "COOPNAV_TEST_DATA"
@@ -24,10 +25,15 @@ def roots(origin: str, extra: Sequence[Path | str] = ()) -> list[Path]:
     return [Path(n) for n in named] + [BESIDE_THE_CHECKOUT]
 
 
-def files(mission: CsvRecording | PyfgRecording) -> Iterator[tuple[str, str]]:
+def files(mission: CsvRecording | PyfgRecording | Recorded) -> Iterator[tuple[str, str]]:
     """Every file a recorded mission names, as (key path, file name)."""
     if isinstance(mission, PyfgRecording):
         yield "mission.file", mission.file
+        return
+    if isinstance(mission, Recorded):
+        for key, name in (("arrivals", mission.arrivals), ("receivers", mission.receivers), ("track", mission.track)):
+            if name is not None:
+                yield f"mission.{key}", name
         return
     for kind in ("odometry", "velocity", "heading", "depth", "fixes", "ranges", "nodes", "truth"):
         for i, source in enumerate(getattr(mission, kind)):

@@ -1,0 +1,147 @@
+"""What happened in a pursuit, slot by slot, and the tracks made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from engine.pursuit.arrivals import Surprise
+from engine.pursuit.mission import PursuitMission, subject
+from engine.pursuit.tracker import Tracker, Update
+from engine.pursuit.water import Ping, Water
+from engine.tracks import Belief, Innovations, PacketCount, Series, Tracks
+
+#: What a vehicle's own satellite position is good for, m, one sigma of each axis (RTK).
+GPS_SIGMA_M = 0.02
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One slot: sender's number (-1 the target, V the shore); who spoke (trials,), who heard (trials, V or V + 1),
+    kind of update (trials, H) at its end; aim (trials, H, 2), what the holders steer by then."""
+
+    cycle: int
+    number: int
+    start_s: float
+    end_s: float
+    sender: int
+    spoke: np.ndarray
+    heard: np.ndarray
+    kind: np.ndarray
+    aim: np.ndarray
+
+
+@dataclass
+class Diary:
+    """Of every slot of a block of trials what was said and heard and what came of it.
+
+    error_m: of the estimate for the present, trailing_m: of the position at the ping, taken for the present, fix_m: of
+    that position against where the target was when the ping was due; each (trials, H) per slot, NaN without an update.
+    """
+
+    mission: PursuitMission
+    pings: list[Ping] = field(default_factory=list)
+    slots: list[Slot] = field(default_factory=list)
+    error_m: list[np.ndarray] = field(default_factory=list)
+    trailing_m: list[np.ndarray] = field(default_factory=list)
+    fix_m: list[np.ndarray] = field(default_factory=list)
+    surprises: list[Surprise] = field(default_factory=list)
+
+    def note(self, slot: Slot, tracker: Tracker, surprise: Surprise) -> None:
+        """Write a slot down, at its end."""
+        here, d = self.mission.target_at(slot.end_s)[:, None], self.mission.dimensions
+        there = self.mission.target_at(tracker.ping_s)[:, None]
+        for errors, estimate, truth in (
+            (self.error_m, tracker.now, here),
+            (self.trailing_m, tracker.fix, here),
+            (self.fix_m, tracker.fix, there),
+        ):
+            away = np.linalg.norm(estimate.mean[..., :d] - truth, axis=-1)
+            errors.append(np.where(slot.kind == Update.NONE, np.nan, away))
+        self.slots.append(slot)
+        self.surprises.append(surprise)
+
+
+def tracks(diary: Diary, water: Water, tracker: Tracker, packets: PacketCount, notes: tuple[str, ...] = ()) -> Tracks:
+    """The target as every vehicle knows it, where the vehicles went, and the figures of C19 section 3.4 as series.
+
+    Where one station holds the estimate, it is every vehicle's.
+    """
+    mission = diary.mission
+    holders = np.arange(len(mission.names)) % tracker.mean.shape[1]
+    path = water.path(mission.time_s)
+    own = np.broadcast_to(GPS_SIGMA_M**2 * np.eye(2), (*path.shape[:1], path.shape[2], 2, 2))
+    beliefs = {name: Belief(path[:, i], own.copy()) for i, name in enumerate(mission.names)}
+    series, innovations = {}, {}
+    for i, (name, h) in enumerate(zip(mission.names, holders)):
+        beliefs[subject(name)] = Belief(tracker.mean[:, h, :, :2].copy(), tracker.cov[:, h, :, :2, :2].copy())
+        truth = mission.truth[subject(name)]
+        away = np.linalg.norm(path[:, i] - truth - mission.offsets[i], axis=-1)
+        series[f"formation_error_m/{name}"] = Series(f"Formation error of {name}", "m", away, (name,))
+        for key, (title, value) in _figures(diary, int(h)).items():
+            unit = "m" if key.endswith("_m") else "s"
+            series[f"{key}/{name}"] = Series(f"{title} of {name}", unit, value, (subject(name),))
+        innovations[subject(name)] = _innovations(diary, int(h))
+    return Tracks(beliefs=beliefs, packets=packets, innovations=innovations, series=series, notes=notes)
+
+
+def _figures(diary: Diary, h: int) -> dict[str, tuple[str, np.ndarray]]:
+    """Series over report times, NaN but at the report that follows an update, by key: title and (trials, T)."""
+    time_s = diary.mission.time_s
+    kind = np.stack([s.kind[:, h] for s in diary.slots], axis=1)
+    end_s = np.array([s.end_s for s in diary.slots])
+    ping_s = np.array([diary.pings[s.cycle].start_s for s in diary.slots])
+    column = np.searchsorted(time_s, end_s - 1e-9)
+    inside = column < len(time_s)
+
+    def placed(value: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        out = np.full((value.shape[0], len(time_s)), np.nan)
+        for n in np.flatnonzero(inside):
+            row = wanted[:, n]
+            out[row, column[n]] = value[row, n]
+        return out
+
+    found: dict[str, tuple[str, np.ndarray]] = {}
+    errors = {
+        "error_m": ("error at an update", diary.error_m),
+        "trailing_m": ("distance from the fix to where the target is by then", diary.trailing_m),
+        "fix_error_m": ("error of the fix for the time of the ping", diary.fix_m),
+    }
+    duration, delay = time_s[-1], np.broadcast_to(end_s - ping_s, kind.shape)
+    for wanted, word in ((Update.FULL, "full"), (Update.PARTIAL, "partial")):
+        for key, (title, slots) in errors.items():
+            value = np.stack([v[:, h] for v in slots], axis=1)
+            found[f"{word}_{key}"] = (f"{word.capitalize()} information: {title}", placed(value, kind == wanted))
+        title = f"{word.capitalize()} information: time since the ping"
+        found[f"{word}_delay_s"] = (title, placed(delay, kind == wanted))
+    first = _first_of_cycle(diary, kind)
+    found["first_delay_s"] = ("Time from the ping to the first update", placed(delay, first))
+    trailing = np.stack([v[:, h] for v in diary.trailing_m], axis=1)
+    for word, low, high in (("early", 0.25, 0.5), ("late", 0.75, 1.0)):
+        within = (end_s > low * duration) & (end_s <= high * duration)
+        title = f"{word.capitalize()} in the mission: distance from the fix to where the target is by then"
+        found[f"{word}_trailing_m"] = (title, placed(trailing, (kind != Update.NONE) & within))
+    return found
+
+
+def _first_of_cycle(diary: Diary, kind: np.ndarray) -> np.ndarray:
+    first = np.zeros(kind.shape, bool)
+    cycles = np.array([s.cycle for s in diary.slots])
+    for c in np.unique(cycles):
+        mine = np.flatnonzero(cycles == c)
+        updated = kind[:, mine] != Update.NONE
+        any_of = updated.any(axis=1)
+        first[any_of, mine[np.argmax(updated, axis=1)][any_of]] = True
+    return first
+
+
+def _innovations(diary: Diary, h: int) -> Innovations:
+    """Every update's innovation as one number: the root of its normalized square per degree of freedom."""
+    nis = np.stack([s.nis[:, h] for s in diary.surprises], axis=1)
+    dof = np.stack([s.dof[:, h] for s in diary.surprises], axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        value = np.where(dof > 0, np.sqrt(nis / dof), np.nan)
+    return Innovations(
+        np.array([s.end_s for s in diary.slots]), value, np.where(dof > 0, 1.0, np.nan), np.ones(value.shape, bool)
+    )
