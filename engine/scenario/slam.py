@@ -33,6 +33,12 @@ class Craft(Table):
     depth_m: Depth = Field(1.5, description="depth of its hydrophone or source, m")
 
 
+class Listener(Craft):
+    """The vehicle with the hydrophone."""
+
+    around_beacon: bool = Field(False, description="its path's coordinates are from the beacon, wherever that is then")
+
+
 class SonarSettings(Table):
     """What is transmitted, how it is recorded, and how the receiver processes it."""
 
@@ -149,7 +155,7 @@ class SlamScenario(ScenarioBase):
 
     family: Literal["slam"] = Field(description="kind of mission")
     mission: Mission = Field(Simulated(kind="simulated"), description="simulated, or where the recording is")
-    vehicle: Craft | None = Field(None, description="who listens")
+    vehicle: Listener | None = Field(None, description="who listens")
     beacon: Craft | None = Field(None, description="who sounds")
     water: WaterSettings | None = Field(None, description="sound and noise as they are")
     sonar: SonarSettings = Field(SonarSettings.model_validate({}), description="sound as the receiver takes it to be")

@@ -57,7 +57,8 @@ def truth(scenario: SlamScenario) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     assert scenario.vehicle is not None and scenario.beacon is not None
     time_s = scenario.sonar.interval_s * np.arange(scenario.poses)
     vehicle = route(scenario.vehicle.path, scenario.seed, scenario.vehicle.name)(time_s).position
-    return time_s, vehicle, route(scenario.beacon.path, scenario.seed, scenario.beacon.name)(time_s).position
+    beacon = route(scenario.beacon.path, scenario.seed, scenario.beacon.name)(time_s).position
+    return time_s, vehicle + beacon if scenario.vehicle.around_beacon else vehicle, beacon
 
 
 def evenly(count: int, poses: int) -> list[int]:

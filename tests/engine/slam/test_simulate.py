@@ -91,3 +91,11 @@ def test_the_outline_shows_what_was_heard_and_fixed(mission):
     )
     assert all(p["tol_s"] < p["toa_s"] for p in packets)
     assert [e["time_s"] for e in shown.events if e["kind"] == "fix"] == [0.0, 99.0]
+
+
+def test_a_path_may_go_around_a_beacon_under_way():
+    towed = {"kind": "waypoints", "points_m": [[0.0, 0.0], [200.0, 0.0]], "speed_mps": 1.0}
+    flown = fly(scenario(vehicle={"around_beacon": True}, beacon={"path": towed}), [0])
+    apart = flown.truth["auv"] - flown.truth["beacon"]
+    np.testing.assert_allclose(np.linalg.norm(apart, axis=-1), 40.0)
+    assert flown.truth["beacon"][0, -1, 0] == pytest.approx(99.0)
