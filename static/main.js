@@ -1,5 +1,6 @@
 // Puts the page together: reads the library, follows the address, connects panes to their scenes.
 
+import { mountScorecard } from "./claims/scorecard.js";
 import { listenKeys } from "./keyboard.js";
 import { mountAlgorithms } from "./library/algorithms.js";
 import { mountLaunch } from "./library/launch.js";
@@ -10,6 +11,7 @@ import { mountNotices } from "./notices.js";
 import { mountRooms } from "./rooms.js";
 import { mountRuns } from "./runs/runs.js";
 import { mountSide } from "./side.js";
+import { mountBroadcasts } from "./smoothing/broadcasts.js";
 import { clock } from "./state/clock.js";
 import { suspect } from "./state/connection.js";
 import { pickAgain, readLibrary } from "./state/library.js";
@@ -48,9 +50,11 @@ const session = new SceneSession({
 mountToolbar(session);
 mountTimeline();
 mountPlots();
+mountBroadcasts();
 mountTable();
 mountClaims();
 mountRuns();
+mountScorecard();
 listenKeys(window);
 
 store.watch(["run", "room"], ({ run, room }) => (part("workbench").hidden = run === null || room !== "workbench"));

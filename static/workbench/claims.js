@@ -1,10 +1,10 @@
-// What the mission's source asserts, and whether this run bears it out.
+// What the mission's source asserts, whether this run bears it out, and the moment that shows it.
 
+import { momentOf } from "../claims/moment.js";
+import { figuresOf, verdictOf } from "../claims/words.js";
 import { el, part } from "../look/dom.js";
-import { number } from "../look/format.js";
+import { clock } from "../state/clock.js";
 import { store } from "../state/store.js";
-
-const SIGNS = { "<": "<", "<=": "≤", ">": ">", ">=": "≥", "==": "=" };
 
 export function mountClaims() {
   const room = part("claims");
@@ -16,7 +16,7 @@ export function mountClaims() {
     const holding = tried.filter((c) => c.holds).length;
     room.replaceChildren(
       el("div", { class: "heading" }, el("h2", {}, "Claims"), el("span", { class: "whose" }, `${holding} of ${tried.length} hold`), source(result)),
-      el("ul", {}, claims.map(entry)),
+      el("ul", {}, claims.map((found, n) => entry(found, result.scenario?.claims?.[n]))),
     );
   });
 }
@@ -25,18 +25,24 @@ function source({ scenario }) {
   return scenario?.source ? el("span", { class: "source" }, scenario.source) : null;
 }
 
-function entry({ text, value, operator, bound, holds, reason }) {
-  const [word, mark, tone] = holds === null ? ["not tried", "–", "calm"] : holds ? ["holds", "✓", "good"] : ["does not hold", "✗", "bad"];
-  const figures = value === null || value === undefined ? reason : `${told(value)} ${SIGNS[operator] ?? operator} ${told(bound)}`;
+function entry(found, claim) {
+  const { word, mark, tone } = verdictOf(found.holds);
+  const figures = figuresOf(found);
   return el(
     "li",
-    { "data-holds": String(holds) },
+    { "data-holds": String(found.holds) },
     el("span", { class: `verdict ${tone}` }, el("span", { class: "mark", "aria-hidden": "true" }, mark), word),
-    el("span", { class: "text" }, text),
-    figures ? el("span", { class: "figures" }, figures) : null,
+    el("span", { class: "text" }, found.text),
+    el("span", { class: "figures" }, figures),
+    claim && found.holds !== null ? el("button", { type: "button", class: "small show", "aria-label": `Show: ${found.text}`, onclick: () => show(claim) }, "Show") : null,
   );
 }
 
-function told(value) {
-  return typeof value === "number" ? number(value, 4) : String(value);
+/** Moves to the moment that shows a claim, and to the vehicle it is about. */
+function show(claim) {
+  const { view } = store.state;
+  if (!view) return;
+  if (view.subjects.some((s) => s.name === claim.subject)) store.set({ vehicle: claim.subject });
+  clock.seek(momentOf(claim, view));
+  part("stage").scrollTo({ top: 0 });
 }
