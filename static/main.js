@@ -11,7 +11,6 @@ import { mountNotices } from "./notices.js";
 import { mountRooms } from "./rooms.js";
 import { mountRuns } from "./runs/runs.js";
 import { mountSide } from "./side.js";
-import { mountBroadcasts } from "./smoothing/broadcasts.js";
 import { clock } from "./state/clock.js";
 import { suspect } from "./state/connection.js";
 import { pickAgain, readLibrary } from "./state/library.js";
@@ -50,7 +49,6 @@ const session = new SceneSession({
 mountToolbar(session);
 mountTimeline();
 mountPlots();
-mountBroadcasts();
 mountTable();
 mountClaims();
 mountRuns();
