@@ -19,7 +19,7 @@ W11's packet of 14 floats. Full states can be had; then only the launch acknowle
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -33,7 +33,7 @@ from engine.navigation.deif import floats_of, from_nothing, make_server
 from engine.navigation.mission import Arrival, Launch, NavigationMission
 from engine.navigation.network import Member, Packet, correlation_of, run_nodes, slant_to_horizontal
 from engine.navigation.ranging import Innovation
-from engine.navigation.served import ServedFilter
+from engine.navigation.served import ServedFilter, only_in
 from engine.registry import Algorithm, Progress
 from engine.tracks import Tracks
 
@@ -41,6 +41,8 @@ from engine.tracks import Tracks
 DEAD_CORRELATION = 1e-4
 #: The recovered step is refused where round-off may exceed this part of the information it rests on.
 WORST_ROUND_OFF = 1e-4
+#: No honest sender is so far away or so uncertain, m, and no term of an honest step is so large (NaN is not smaller).
+FARTHEST_M, LARGEST_TERM = 1e8, 1e16
 #: Launch states a server keeps for its clients to choose an origin from, and a client keeps to recognize it.
 SERVER_KEEPS, CLIENT_KEEPS = 24, 8
 
@@ -357,7 +359,7 @@ class MdeifNode:
             self.restarted[sender] = self.restarted.get(sender, np.zeros(trials, int)) + again
         begun = valid & (graph.last < 0)
         fixed = self.member.sizes[sender] == 2
-        link, stepped = self._step(graph, s, origin, valid & ~begun, fixed)
+        link, stepped = _proper(*self._step(graph, s, origin, valid & ~begun, fixed))
         self.skipped[sender] = self.skipped.get(sender, np.zeros(trials, int)) + (valid & ~begun & ~stepped)
         start = from_nothing(keep(s, slice(0, n)))
         self.client.integrate(sender, _where(begun, start, link), begun | stepped)
@@ -422,10 +424,30 @@ def _pair_of(record: np.ndarray, n: int) -> tuple[Moments, np.ndarray]:
     finite = np.logical_and.reduce(np.isfinite(flat), axis=-1)
     cov = np.where(finite[:, None, None], cov, np.eye(2 * n))
     values = np.linalg.eigvalsh(cov)
-    proper = finite & (values[:, 0] >= -1e-9 * values[:, -1]) & (values[:, -1] > 0)
+    proper = finite & (values[:, 0] >= -1e-9 * values[:, -1]) & (values[:, -1] > 0) & (values[:, -1] < FARTHEST_M**2)
+    proper &= (np.abs(np.where(finite[:, None], record["mean"], 0.0)) < FARTHEST_M).all(axis=-1)
+    origin = np.linalg.eigvalsh(cov[:, n:, n:])
+    proper &= origin[:, 0] > 1e-14 * origin[:, -1]
     return Moments(
         np.where(proper[:, None], record["mean"], 0.0), np.where(proper[:, None, None], cov, np.eye(2 * n))
     ), proper
+
+
+def _proper(link: Link, where: np.ndarray) -> tuple[Link, np.ndarray]:
+    """The link with C and J without negative parts, and in which trials of a mask it is of a credible size.
+
+    Honest packets give negative parts by round-off alone; a damaged one may give a step that is none.
+    """
+    parts = [link.A, link.b[..., None], link.C, link.eta[..., None], link.J]
+    largest = np.max([np.abs(part).max(axis=(-2, -1), initial=0.0) for part in parts], axis=0)
+    where = where & (largest < LARGEST_TERM)
+    link = only_in(where, link)
+    definite = {}
+    for name in ("C", "J"):
+        values, vectors = np.linalg.eigh(getattr(link, name))
+        clipped = (vectors * np.maximum(values, 0.0)[..., None, :]) @ transpose(vectors)
+        definite[name] = np.where((values[..., 0] < 0)[..., None, None], clipped, getattr(link, name))
+    return replace(link, **definite), where
 
 
 def _harmless(moments: Moments, where: np.ndarray) -> Moments:
