@@ -41,6 +41,16 @@ def read_records(path: Path, sonar: Sonar, starts_s: np.ndarray, key: str, *, ch
     return padded[first[:, None] + np.arange(sonar.record_samples)]
 
 
+def read_waveform(path: Path, sonar: Sonar, key: str) -> np.ndarray:
+    """A transmitted waveform (n,) from a file of samples at the sonar's rate. Raises ScenarioError at `key`."""
+    found = _samples(path, sonar, key, 0).astype(float)
+    if found.ndim != 1 or not 2 <= len(found) <= sonar.record_samples or not found.any():
+        raise _fault(
+            key, f"{path.name} is no waveform", f"give one of 2 to {sonar.record_samples} samples, not silence"
+        )
+    return found
+
+
 def _samples(path: Path, sonar: Sonar, key: str, channel: int) -> np.ndarray:
     """All of a file's samples, float32: (n,), or (T, n) where it is cut already."""
     suffix = path.suffix.lower()

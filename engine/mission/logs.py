@@ -8,7 +8,7 @@ from pathlib import Path
 
 from engine.scenario.errors import Problem, ScenarioError
 from engine.scenario.pursuit import Recorded
-from engine.scenario.recording import CsvRecording, PyfgRecording
+from engine.scenario.recording import CsvRecording, PyfgRecording, SonarRecording
 
 DATA_VARIABLE = "COOPNAV_TEST_DATA"
 MAX_BYTES = 200_000_000
@@ -25,10 +25,15 @@ def roots(origin: str, extra: Sequence[Path | str] = ()) -> list[Path]:
     return [Path(n) for n in named] + [BESIDE_THE_CHECKOUT]
 
 
-def files(mission: CsvRecording | PyfgRecording | Recorded) -> Iterator[tuple[str, str]]:
+def files(mission: CsvRecording | PyfgRecording | SonarRecording | Recorded) -> Iterator[tuple[str, str]]:
     """Every file a recorded mission names, as (key path, file name)."""
     if isinstance(mission, PyfgRecording):
         yield "mission.file", mission.file
+        return
+    if isinstance(mission, SonarRecording):
+        for key in ("records", "pings", "chirp"):
+            if getattr(mission, key) is not None:
+                yield f"mission.{key}", getattr(mission, key)
         return
     if isinstance(mission, Recorded):
         for key, name in (("arrivals", mission.arrivals), ("receivers", mission.receivers), ("track", mission.track)):

@@ -7,11 +7,13 @@ from typing import Annotated, Literal
 from pydantic import Field, StringConstraints, model_validator
 
 from engine.scenario.errors import Problem
-from engine.scenario.models import Positive, Table, faults
+from engine.scenario.models import Name, Point, Positive, Table, faults
 
 #: A folder's or file's own name: no path, nothing hidden. "." is the scenario file's own folder.
 FolderName = Annotated[str, StringConstraints(pattern=r"^(\.|[A-Za-z0-9][A-Za-z0-9_.-]{0,99})$")]
 FileName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}\.(csv|tsv|txt|pyfg|fg)$")]
+#: A file of samples.
+SoundName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}\.(wav|npy|txt)$")]
 Column = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 Unit = Literal["s", "ms", "us", "ns"]
 AngleUnit = Literal["rad", "deg"]
@@ -228,6 +230,41 @@ class PyfgRecording(Table):
         description="what the file's poses are: a truth, the vehicle's own navigation, or nothing to score by",
     )
     max_gap_s: Positive = Field(10.0, description="longest gap between poses to interpolate the reference over, s")
+
+
+class SonarRecording(Table):
+    """Hydrophone records of a beacon's transmissions, and a CSV file with a row for each of them in order of time.
+
+    Records are a WAV file, or a .npy array or text column of samples, cut at the `start` of each row (its time where
+    there is no such column); or a .npy array with one record a row. Every transmission is a pose of the vehicle.
+    """
+
+    kind: Literal["recorded"]
+    format: Literal["sonar"]
+    log: FolderName = Field(description='name of the folder; "." is the scenario file\'s own')
+    vehicle: Name = Field("auv", description="who recorded")
+    beacon: Name = Field("beacon", description="who transmitted")
+    records: SoundName = Field(description="file of the records")
+    channel: int = Field(0, ge=0, le=1000, description="channel of a WAV file to use, from 0")
+    chirp: SoundName | None = Field(None, description="file of the transmitted waveform; without it sonar's chirp")
+    pings: File
+    time: Time
+    time_unit: TimeUnit = "s"
+    start: Column | None = Field(None, description="column of when a transmission is in the file of the records, s")
+    x: Column = Field(description="column of the dead-reckoned position east, m")
+    y: Column = Field(description="column of the dead-reckoned position north, m")
+    fix_x: Column | None = Field(None, description="column of position fixes east, m; empty where there is none")
+    fix_y: Column | None = Field(None, description="column of position fixes north, m; empty where there is none")
+    truth_x: Column | None = Field(None, description="column of the vehicle's true position east, m, to score by")
+    truth_y: Column | None = Field(None, description="column of the vehicle's true position north, m, to score by")
+    beacon_m: Point | None = Field(None, description="the beacon's true position [x, y], m, to score by")
+
+    @model_validator(mode="after")
+    def _pairs(self) -> SonarRecording:
+        for x, y in (("fix_x", "fix_y"), ("truth_x", "truth_y")):
+            if (getattr(self, x) is None) != (getattr(self, y) is None):
+                raise faults([Problem(x, f"goes with {y}", "name both columns, or neither")])
+        return self
 
 
 Recording = Annotated[CsvRecording | PyfgRecording, Field(discriminator="format")]

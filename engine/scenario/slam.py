@@ -12,7 +12,7 @@ from engine.scenario.errors import Problem
 from engine.scenario.models import Fraction, Name, NotNegative, Point, Positive, ScenarioBase, Table, faults
 from engine.scenario.navigation import MAX_VEHICLES
 from engine.scenario.paths import Path
-from engine.scenario.recording import CsvRecording, PyfgRecording, Simulated
+from engine.scenario.recording import CsvRecording, PyfgRecording, Simulated, SonarRecording
 from engine.scenario.vehicles import Vehicle
 
 #: Bounds on what one trial may produce.
@@ -138,7 +138,8 @@ def _which(value: Any) -> str:
 Mission = Annotated[
     Annotated[Simulated, Tag("simulated")]
     | Annotated[CsvRecording, Tag("csv")]
-    | Annotated[PyfgRecording, Tag("pyfg")],
+    | Annotated[PyfgRecording, Tag("pyfg")]
+    | Annotated[SonarRecording, Tag("sonar")],
     Discriminator(_which, custom_error_type="mission", custom_error_message="is no known mission"),
 ]
 
@@ -149,8 +150,8 @@ SIMULATED, RECORDED = ("vehicle", "beacon", "water"), ("vehicles",)
 class SlamScenario(ScenarioBase):
     """A vehicle that locates beacons, and itself, by the sound it hears from them.
 
-    A simulated mission has one vehicle and one beacon, and waveforms; a recorded one has `vehicles` as a navigation
-    scenario does, of which the fixed ones are the beacons, and ranges.
+    A simulated mission has one vehicle and one beacon, and waveforms, and so has a recording of waveforms; a log of
+    ranges has `vehicles` as a navigation scenario does, of which the fixed ones are the beacons.
     """
 
     family: Literal["slam"] = Field(description="kind of mission")
@@ -179,14 +180,14 @@ class SlamScenario(ScenarioBase):
         return self
 
 
-def array_starts(scenario: SlamScenario) -> list[int]:
-    """Numbers of the poses at which the synthetic arrays start, in order."""
+def array_starts(scenario: SlamScenario, poses: int) -> list[int]:
+    """Numbers of the poses, of so many, at which the synthetic arrays start, in order."""
     arrays = scenario.arrays
     if arrays.starts is not None:
         return sorted(arrays.starts)
     if arrays.count == 0:
         return []
-    room = scenario.poses - arrays.elements
+    room = poses - arrays.elements
     return [round(k * room / max(1, arrays.count - 1)) for k in range(arrays.count)]
 
 
@@ -206,21 +207,30 @@ def _simulated(scenario: SlamScenario) -> Iterator[Problem]:
         remedy = f"keep duration_s / sonar.interval_s between 1 and {MAX_POSES - 1}"
         yield Problem("duration_s", f"makes {poses} poses", remedy)
         return
+    yield from fitting(scenario, poses)
+
+
+def fitting(scenario: SlamScenario, poses: int) -> Iterator[Problem]:
+    """What asks for more fixes, ranges or arrays than so many poses have."""
     for key, count in (("fixes", scenario.fixes.count), ("ranging", scenario.ranging.count)):
         if count > poses:
             yield Problem(f"{key}.count", f"{count} are more than the {poses} poses", "ask for fewer")
-    starts, elements = array_starts(scenario), scenario.arrays.elements
+    starts, elements = array_starts(scenario, poses), scenario.arrays.elements
     key = "arrays.starts" if scenario.arrays.starts is not None else "arrays.count"
     if any(b - a < elements for a, b in pairwise(starts)):
         yield Problem(key, f"arrays of {elements} elements overlap", "ask for fewer, or shorter ones")
-    if starts and not 0 <= starts[-1] <= poses - elements:
+    if starts and not 0 <= starts[0] <= starts[-1] <= poses - elements:
         yield Problem(key, f"an array at pose {starts[-1]} does not end within {poses} poses", "start it earlier")
 
 
 def _recorded(scenario: SlamScenario) -> Iterator[Problem]:
     for key in SIMULATED:
         if getattr(scenario, key) is not None:
-            yield Problem(key, "is of simulated missions", "describe vehicle and beacons under vehicles")
+            yield Problem(key, "is of simulated missions", "leave it out")
+    if isinstance(scenario.mission, SonarRecording):
+        if scenario.vehicles:
+            yield Problem("vehicles", "is of logs of ranges", "name the vehicle and the beacon under mission")
+        return
     moving = [v.name for v in scenario.vehicles if v.kind != "fixed"]
     if len(moving) != 1:
         found = f"has {len(moving)} that move" + (f" ({', '.join(moving)})" if moving else "")

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from engine.mission.logs import log_folder
 from engine.registry import Outline
-from engine.scenario.recording import Simulated
+from engine.scenario.recording import Simulated, SonarRecording
 from engine.scenario.slam import SlamScenario
 from engine.slam.log import SlamLog
 from engine.slam.recorded import Recorded, read
 from engine.slam.simulate import fly_trial, truth
+from engine.slam.sonar_recording import read_sonar
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,13 @@ class SlamMission:
 def fly(scenario: SlamScenario, trials: Sequence[int]) -> SlamMission:
     """The mission of a block of trials, given by their absolute numbers."""
     if not isinstance(scenario.mission, Simulated):
-        recorded = read(scenario)
-        moving = next(v.name for v in scenario.vehicles if v.kind != "fixed")
-        beacons = tuple(v.name for v in scenario.vehicles if v.kind == "fixed")
+        if isinstance(scenario.mission, SonarRecording):
+            recorded = read_sonar(scenario, scenario.mission, log_folder(scenario))
+            moving, beacons = scenario.mission.vehicle, (scenario.mission.beacon,)
+        else:
+            recorded = read(scenario)
+            moving = next(v.name for v in scenario.vehicles if v.kind != "fixed")
+            beacons = tuple(v.name for v in scenario.vehicles if v.kind == "fixed")
         return SlamMission(
             scenario, tuple(trials), recorded.time_s, recorded.truth, moving, beacons, recorded, scenario.options
         )
@@ -64,8 +70,10 @@ def outline(mission: SlamMission) -> Outline:
     depth = {c.name: c.depth_m for c in (scenario.vehicle, scenario.beacon) if c is not None}
     depth |= {v.name: v.depth_m for v in scenario.vehicles}
     kinds = {v.name: v.kind for v in scenario.vehicles}
-    subjects = [{"name": mission.vehicle, "kind": kinds.get(mission.vehicle, "auv"), "depth_m": depth[mission.vehicle]}]
-    subjects += [{"name": name, "kind": "beacon", "depth_m": depth[name]} for name in mission.beacons]
+    subjects = [
+        {"name": mission.vehicle, "kind": kinds.get(mission.vehicle, "auv"), "depth_m": depth.get(mission.vehicle, 0.0)}
+    ]
+    subjects += [{"name": name, "kind": "beacon", "depth_m": depth.get(name, 0.0)} for name in mission.beacons]
     heard = [(p.pose, p.beacon, p.strongest_m) for p in log.pings]
     heard += [(r.pose, r.beacon, r.range_m) for r in log.readings]
     heard += [(k, a.beacon, a.array.focus_m) for a in log.arrays for k in a.poses]

@@ -6,10 +6,10 @@ from tests.engine.slam.missions import scenario
 
 
 def test_arrays_reach_from_end_to_end():
-    assert array_starts(scenario(arrays={"count": 3, "elements": 10})) == [0, 45, 90]
-    assert array_starts(scenario(arrays={"starts": [60, 5]})) == [5, 60]
-    assert array_starts(scenario(arrays={"count": 0})) == []
-    assert array_starts(scenario(arrays={"count": 1})) == [0]
+    assert array_starts(scenario(arrays={"count": 3, "elements": 10}), 100) == [0, 45, 90]
+    assert array_starts(scenario(arrays={"starts": [60, 5]}), 100) == [5, 60]
+    assert array_starts(scenario(arrays={"count": 0}), 100) == []
+    assert array_starts(scenario(arrays={"count": 1}), 100) == [0]
 
 
 @pytest.mark.parametrize(

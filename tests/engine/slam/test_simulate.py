@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from engine.slam.hearing import evenly
 from engine.slam.mission import fly, outline
-from engine.slam.simulate import evenly, listen, records
+from engine.slam.simulate import listen, records
 from tests.engine.slam.missions import scenario
 
 
