@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sqlite3
 from collections.abc import AsyncIterator
 from importlib.metadata import version
 
 from fastapi import FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 
-from server import problems
+from server import problems, recovery
 from server.api import algorithms, docs, health, jobs, marks, page, scenarios, scenes, tables, tracking
 from server.cluster import Cluster
 from server.guard import Guard
@@ -21,7 +22,6 @@ from server.scenes.sessions import Sessions
 from server.settings import Settings
 from server.shelf import Shelf
 from server.site import Site
-from server.store import Store
 from server.wire import Json
 
 DESCRIPTION = """Compare cooperative underwater navigation estimators. Errors are problem+json
@@ -35,7 +35,7 @@ def create_app(settings: Settings) -> FastAPI:
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         settings.data.mkdir(parents=True, exist_ok=True)
-        store = Store(settings.data / "coopnav.sqlite")
+        store = recovery.open_store(settings.data)
         journal = Journal(store)
         cluster = Cluster(settings)
         work = Jobs(store, journal, cluster, settings)
@@ -52,7 +52,8 @@ def create_app(settings: Settings) -> FastAPI:
             await work.close()
             starting.cancel()
             await asyncio.gather(starting, return_exceptions=True)
-            await journal.flush()
+            with contextlib.suppress(sqlite3.OperationalError):
+                await journal.flush()
             await cluster.close()
             store.close()
 

@@ -7,7 +7,7 @@ import json
 import os
 import platform
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
@@ -20,7 +20,7 @@ from engine.runner import Shard
 from engine.tracks import Belief, Innovations, PacketCount, Reference, Samples, Series, Tracks
 from server.wire import dumps, plain
 
-RESULT, ARRAYS, VERSIONS = "result.json", "arrays.npz", "versions.json"
+RESULT, ARRAYS, VERSIONS, SUMS = "result.json", "arrays.npz", "versions.json", "SHA256SUMS"
 
 
 def graph_file(algorithm: str) -> str:
@@ -54,6 +54,26 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> str:
     finally:
         os.close(folder)
     return digest
+
+
+def write_sums(folder: Path, names: Sequence[str]) -> None:
+    """Note the checksums of files in their folder, as `sha256sum --check` reads them."""
+    write_text(folder / SUMS, "".join(f"{sha256(folder / name)}  {name}\n" for name in names))
+
+
+def read_sums(folder: Path) -> dict[str, str]:
+    """The checksums noted in a folder, by file name; none where none were noted."""
+    try:
+        lines = (folder / SUMS).read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        return {}
+    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+
+
+def sound(folder: Path) -> bool:
+    """Whether a folder's checksums were noted and all its files are as they were then."""
+    sums = read_sums(folder)
+    return bool(sums) and all((folder / n).is_file() and sha256(folder / n) == digest for n, digest in sums.items())
 
 
 def write_text(path: Path, text: str) -> str:

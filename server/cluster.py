@@ -22,6 +22,8 @@ from server.work import Piece
 
 log = logging.getLogger(__name__)
 
+# Dask gives a process up that is not there so long after it ended once, even if it is just ending for the second time.
+dask.config.set({"distributed.deploy.lost-worker-timeout": "1000 days"})
 
 #: Pause between attempts to reach somebody's cluster.
 AGAIN_S = 1.0
@@ -131,8 +133,16 @@ class Cluster:
         """Return when the connection is lost."""
         while self.client.status == "running":
             await asyncio.sleep(LOOK_S)
+            self._refill()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._look(), 5)
+
+    def _refill(self) -> None:
+        """Start processes of our own in place of those whose nanny gave up."""
+        if self._own is None or len(self._own.workers) >= self._settings.workers:
+            return
+        log.warning("%d of %d workers are left; others are started", len(self._own.workers), self._settings.workers)
+        self._own.scale(self._settings.workers)
 
     async def _look(self) -> None:
         """See which workers there are."""

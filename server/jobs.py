@@ -11,10 +11,11 @@ import math
 import secrets
 import shutil
 import sqlite3
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from engine import runner
 from engine.scenario import toml
@@ -26,6 +27,8 @@ from server.flow import Flow
 from server.journal import Journal
 from server.plan import Plan
 from server.problems import Refusal, disk_full
+from server.recovery import write_record
+from server.retention import superfluous
 from server.settings import Settings
 from server.store import FINAL, Job, Store
 from server.watch import Watch
@@ -33,7 +36,14 @@ from server.wire import dumps
 
 log = logging.getLogger(__name__)
 
+T = TypeVar("T")
+
 OUTLINE, VIEW = "outline.json", "view.json"
+FILES = (artifacts.RESULT, artifacts.ARRAYS, artifacts.VERSIONS, VIEW)
+#: Old jobs are looked for this often at least.
+TIDY_S = 3600.0
+#: So many files are remembered to be as they were written.
+MOST_CHECKED = 2000
 #: A what-if job that takes more worker seconds stands in line like any other.
 WHAT_IF_S = 120.0
 #: Pause between attempts to record what a full disk did not take.
@@ -78,6 +88,9 @@ class Jobs:
         self._cluster, self._settings = cluster, settings
         self._flow = Flow(cluster)
         self._assembling = asyncio.Semaphore(1)
+        self._ended = asyncio.Event()
+        self._checked: dict[Path, tuple[int, int, int]] = {}
+        self._tidying: asyncio.Task[None] | None = None
         self._folder = settings.data / "jobs"
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._clients: dict[str, str] = {}
@@ -87,10 +100,11 @@ class Jobs:
         """Take up the jobs accepted before a restart; they run once the cluster is ready."""
         for job in self.store.unfinished():
             self._begin(job)
+        self._tidying = asyncio.create_task(self.tidy())
 
     async def close(self) -> None:
         """Stop working; unfinished jobs stay accepted."""
-        tasks = list(self._tasks.values())
+        tasks = [*self._tasks.values(), *([self._tidying] if self._tidying else [])]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -148,15 +162,18 @@ class Jobs:
             changes=wanted.body.get("set", {}),
         )
         self._clients[job.id] = job.client
+        folder = self._folder / job.id
         try:
+            await asyncio.to_thread(write_record, folder, job)
             kept, new = await asyncio.to_thread(self.store.add, job)
             if not new:
                 return _same(kept, digest)
+            self._begin(kept)
+            return kept
         finally:
             if job.id not in self._tasks:
                 del self._clients[job.id]
-        self._begin(kept)
-        return kept
+                await asyncio.to_thread(shutil.rmtree, folder, True)
 
     def _check_room(self, price: cost.Cost) -> None:
         """Refusal 507 where the disk has no room for a result and its shards."""
@@ -183,7 +200,8 @@ class Jobs:
         if changed is not None and task is not None:
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
-            self._drop_shards(id)
+            await asyncio.to_thread(self._drop_shards, id)
+            await asyncio.to_thread(self._note_record, id)
         return self.find(id)
 
     async def delete(self, id: str) -> None:
@@ -193,6 +211,25 @@ class Jobs:
         self.journal.wake()
         await asyncio.to_thread(shutil.rmtree, self._folder / id, True)
 
+    def mark(self, id: str, **marks: Any) -> Job:
+        """Keep a person's marks on a job; Refusal 404 where there is none."""
+        self.store.mark(id, **marks)
+        job = self.find(id)
+        self._note_record(id)
+        return job
+
+    async def tidy(self) -> None:
+        """Delete the jobs that are to make room, now and whenever one has ended or an hour has passed."""
+        while True:
+            going = await asyncio.to_thread(superfluous, self.store, self._folder, self._settings)
+            for job in going:
+                if await asyncio.to_thread(self.store.drop, job.id):
+                    log.info("job %s is old and makes room", job.id)
+                    await asyncio.to_thread(shutil.rmtree, self._folder / job.id, True)
+            self._ended.clear()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._ended.wait(), TIDY_S)
+
     def find(self, id: str) -> Job:
         """The job of an id; Refusal 404 where there is none."""
         job = self.store.job(id)
@@ -201,18 +238,38 @@ class Jobs:
         return job
 
     def artifact(self, id: str, name: str) -> Path:
-        """A file of a finished job; Refusal 409 before it is there."""
+        """A file of a finished job; Refusal 409 before it is there, 410 where it is not as it was written."""
         job = self.find(id)
         if job.state != "done":
             raise Refusal(409, "not-done", f"the job is {job.state}; it has no result")
-        return self._folder / job.id / name
+        path = self._folder / job.id / name
+        if not self._as_written(path):
+            log.error("%s is not as it was written", path)
+            raise Refusal(410, "damaged", f"{name} of this job was damaged on the disk; run the job again")
+        return path
+
+    def _as_written(self, path: Path) -> bool:
+        """Whether a file has the checksum noted for it; it is read once for every time that it changes."""
+        try:
+            found = path.stat()
+        except FileNotFoundError:
+            return False
+        version = (found.st_ino, found.st_size, found.st_mtime_ns)
+        if self._checked.get(path) == version:
+            return True
+        noted = artifacts.read_sums(path.parent).get(path.name)
+        if noted is not None and artifacts.sha256(path) != noted:
+            return False
+        if len(self._checked) >= MOST_CHECKED:
+            self._checked.clear()
+        self._checked[path] = version
+        return True
 
     def view(self, id: str) -> str | None:
         """The view as JSON text: the finished one, or of what there is so far; None before anything."""
         job = self.find(id)
-        finished = self._folder / job.id / VIEW
         if job.state == "done":
-            return finished.read_text(encoding="utf-8")
+            return self.artifact(id, VIEW).read_text(encoding="utf-8")
         parts = self._parts(job)
         outline = self.outline(id)
         if outline is None or not parts:
@@ -259,8 +316,16 @@ class Jobs:
                 log.error("job %s: cannot record %s: %s", id, values.get("state"), error)
                 await asyncio.sleep(AGAIN_S)
             else:
-                self.journal.wake()
-                return
+                break
+        await asyncio.to_thread(self._note_record, id)
+        self.journal.wake()
+        self._ended.set()
+
+    def _note_record(self, id: str) -> None:
+        job = self.store.job(id)
+        with contextlib.suppress(OSError):  # a copy without it computes the job again
+            if job is not None:
+                write_record(self._folder / id, job)
 
     async def _compute(self, job: Job) -> None:
         folder = self._folder / job.id
@@ -274,21 +339,24 @@ class Jobs:
         plan = Plan(job, shards, self.store, watch, lambda number: self._shard_file(job.id, number))
         self._flow.join(plan)
         limit_s = min(job.limit_s or math.inf, self._settings.longest_job_s)
+        limit = asyncio.timeout(limit_s)
         try:
             await plan.started.wait()
             if job.state == "queued":
                 await asyncio.to_thread(self.store.change, job.id, state="running", started_at=now())
                 self.journal.wake()
-            async with asyncio.timeout(limit_s):
+            async with limit:
                 await plan.ended
         except TimeoutError:
-            raise TimeIsUp(f"it ran for {limit_s:g} s, which is its limit") from None
+            if limit.expired():
+                raise TimeIsUp(f"it ran for {limit_s:g} s, which is its limit") from None
+            raise
         finally:
             self._flow.leave(plan)
             await plan.settled.wait()
         async with self._assembling:
             lost = list(self.store.lost(job.id).values())
-            notes = await asyncio.to_thread(self._assemble, job, scenario, lost)
+            notes = await _to_the_end(self._assemble, job, scenario, lost)
         for algorithm, (done, seconds) in plan.cost.items():
             await asyncio.to_thread(self.store.worked, algorithm, job.family, done, seconds)
         await self._record(job.id, state="done", progress=1.0, finished_at=now(), notes=notes, lost=lost)
@@ -313,6 +381,7 @@ class Jobs:
         outline = self.outline(job.id) or work.outline(scenario)
         artifacts.write_text(folder / VIEW, dumps(view.build(outline, parts, job.algorithms)))
         artifacts.write_result(folder, result)
+        artifacts.write_sums(folder, FILES)
         notes = [f"{name}: {note}" for name, tracks in result.tracks.items() for note in tracks.notes]
         return [_loss(entry) for entry in lost] + notes
 
@@ -327,6 +396,16 @@ class Jobs:
     def _drop_shards(self, id: str) -> None:
         for path in (self._folder / id).glob("shard-*.npz"):
             path.unlink(missing_ok=True)
+
+
+async def _to_the_end(function: Callable[..., T], *arguments: Any) -> T:
+    """Run a function in a thread; a cancellation takes effect when it has ended."""
+    task = asyncio.ensure_future(asyncio.to_thread(function, *arguments))
+    try:
+        return await asyncio.shield(task)
+    except asyncio.CancelledError:
+        await asyncio.wait({task})
+        raise
 
 
 def _same(known: Job, digest: str) -> Job:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import logging
+import sqlite3
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -11,6 +13,10 @@ from server.wire import dumps
 
 #: Events that arrive within this time are committed together.
 BATCH_S = 0.03
+#: Pause before the next attempt where the disk is full, and how many events wait for it at most, the newest.
+AGAIN_S, MOST_WAITING = 1.0, 10_000
+
+log = logging.getLogger(__name__)
 
 
 class Journal:
@@ -22,6 +28,7 @@ class Journal:
         self._writing: asyncio.Task[None] | None = None
         self._news = asyncio.Event()
         self.closing = asyncio.Event()
+        self._committing = asyncio.Lock()
 
     def say(self, job: str, kind: str, data: Any) -> None:
         """Record an event soon."""
@@ -30,21 +37,31 @@ class Journal:
             self._writing = asyncio.create_task(self._write())
 
     async def _write(self) -> None:
-        while self._waiting:
-            await asyncio.sleep(BATCH_S)
-            await self._commit()
+        """Commit what there is, waiting for room on the disk if need be."""
+        pause_s = BATCH_S
+        while self._waiting and not self.closing.is_set():
+            await asyncio.sleep(pause_s)
+            try:
+                await self._commit()
+                pause_s = BATCH_S
+            except sqlite3.OperationalError as error:
+                log.error("events cannot be recorded: %s", error)
+                pause_s = AGAIN_S
 
     async def _commit(self) -> None:
-        batch, self._waiting = self._waiting, []
-        if batch:
-            await asyncio.to_thread(self._store.append, batch)
+        async with self._committing:
+            batch, self._waiting = self._waiting, []
+            try:
+                if batch:
+                    await asyncio.to_thread(self._store.append, batch)
+            except sqlite3.OperationalError:
+                self._waiting = [*batch, *self._waiting][-MOST_WAITING:]
+                raise
         self.wake()
 
     async def flush(self) -> None:
-        """Return when everything said so far is in the store."""
+        """Return when everything said so far is in the store; sqlite3.OperationalError where that is not possible."""
         await self._commit()
-        if self._writing is not None:
-            await self._writing
 
     def wake(self) -> None:
         """Let readers look at the store again."""

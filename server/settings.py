@@ -22,8 +22,9 @@ class Settings:
     token, where set, is asked of everyone. cluster_ca, cluster_cert and cluster_key are PEM files for a scheduler at a
     tls:// address. workers counts the processes of our own cluster, worker_memory (bytes; None: their share of the
     machine's) is what one of them may use. most_work is trials x vehicles x mission seconds x algorithms of one job;
-    least_free_disk (bytes) stays free on the disk of the data folder. slowest_head_s and slowest_body_s are how long the
-    head and the body of a request may take to arrive.
+    jobs that ended keep_days ago, and the oldest while all take more than keep_bytes, are deleted unless pinned;
+    least_free_disk (bytes) stays free on the disk of the data folder. slowest_head_s and slowest_body_s are how long
+    the head and the body of a request may take to arrive.
     """
 
     data: Path
@@ -45,6 +46,8 @@ class Settings:
     most_jobs_waiting: int = 400
     most_jobs_of_client: int = 250
     least_free_disk: int = 256 * 1024**2
+    keep_days: float | None = None
+    keep_bytes: int | None = None
     longest_job_s: float = 24 * 3600.0
     panes_per_session: int = 6
     panes_altogether: int = 48

@@ -55,6 +55,9 @@ CREATE TABLE rates (
 ALTER TABLE jobs ADD COLUMN tags TEXT NOT NULL DEFAULT '[]';
 ALTER TABLE jobs ADD COLUMN changes TEXT NOT NULL DEFAULT '{}';
 """,
+    """
+CREATE TABLE notes (key TEXT PRIMARY KEY, value TEXT NOT NULL)
+""",
 )
 VERSION = len(MIGRATIONS)
 
@@ -110,6 +113,7 @@ class Event:
 
 
 _JSON = {"algorithms", "error", "notes", "lost", "tags", "changes"}
+_FINAL = ",".join(f"'{state}'" for state in sorted(FINAL))
 _COLUMNS = [f.name for f in fields(Job)]
 
 
@@ -120,15 +124,18 @@ class Store:
         self._lock = threading.RLock()
         self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
         self._db.row_factory = sqlite3.Row
-        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
-            self._db.execute(f"PRAGMA {pragma}")
-        self._migrate(path)
+        try:
+            for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
+                self._db.execute(f"PRAGMA {pragma}")
+            self._migrate(path)
+        except BaseException:
+            self._db.close()
+            raise
 
     def _migrate(self, path: Path) -> None:
         """Take the database to the newest schema, one whole step at a time; a later version's is left alone."""
         found = self._db.execute("PRAGMA user_version").fetchone()[0]
         if found > VERSION:
-            self._db.close()
             raise RuntimeError(f"{path} was written by a later version of coopnav (schema {found}, here {VERSION})")
         for version in range(found, VERSION):
             with self._transaction() as db:
@@ -140,16 +147,33 @@ class Store:
         with self._lock:
             self._db.close()
 
+    def consistent(self) -> bool:
+        """Whether the whole file is as SQLite writes it; reads all of it."""
+        with self._lock:
+            found = self._db.execute("PRAGMA integrity_check(1)").fetchall()
+            return [row[0] for row in found] == ["ok"] and not self._db.execute("PRAGMA foreign_key_check").fetchall()
+
+    def noted(self, key: str) -> str | None:
+        """What was noted of the store itself."""
+        with self._lock:
+            row = self._db.execute("SELECT value FROM notes WHERE key=?", (key,)).fetchone()
+        return row["value"] if row is not None else None
+
+    def note(self, key: str, value: str) -> None:
+        with self._transaction() as db:
+            db.execute("INSERT OR REPLACE INTO notes VALUES (?,?)", (key, value))
+
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
         with self._lock:
             self._db.execute("BEGIN IMMEDIATE")
             try:
                 yield self._db
+                self._db.execute("COMMIT")
             except BaseException:
-                self._db.execute("ROLLBACK")
+                if self._db.in_transaction:  # a full disk has ended it already
+                    self._db.execute("ROLLBACK")
                 raise
-            self._db.execute("COMMIT")
 
     def add(self, job: Job) -> tuple[Job, bool]:
         """Keep a new job and its first event; the earlier job and False where its idempotency key is known."""
@@ -192,6 +216,26 @@ class Store:
         with self._lock:
             rows = self._db.execute("SELECT * FROM jobs WHERE state IN ('queued','running') ORDER BY rowid").fetchall()
         return [_job(row) for row in rows]
+
+    def ended(self) -> list[Job]:
+        """Jobs with an end, oldest first."""
+        with self._lock:
+            rows = self._db.execute(f"SELECT * FROM jobs WHERE state IN ({_FINAL}) ORDER BY rowid").fetchall()
+        return [_job(row) for row in rows]
+
+    def run_again(self, id: str) -> None:
+        """Take a job back to its beginning: its results are lost."""
+        with self._transaction() as db:
+            db.execute("UPDATE jobs SET state='queued', progress=0, finished_at=NULL, error=NULL WHERE id=?", (id,))
+            db.execute("DELETE FROM shards WHERE job=?", (id,))
+            row = db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone()
+            _append(db, id, "state", dumps(_job(row).public()))
+
+    def drop(self, id: str) -> bool:
+        """Delete a job that has ended and is not pinned; whether it was."""
+        with self._transaction() as db:
+            done = db.execute(f"DELETE FROM jobs WHERE id=? AND pinned=0 AND state IN ({_FINAL})", (id,))
+            return done.rowcount > 0
 
     def change(self, id: str, **values: Any) -> Job | None:
         """Change a job and tell so in a state event; None where it is gone or already at its end."""

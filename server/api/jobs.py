@@ -135,6 +135,7 @@ def graphs(id: str, algorithm: str, here: Here) -> FileResponse:
 @router.get("/jobs/{id}/report", response_class=HTMLResponse)
 def job_report(id: str, here: Here) -> HTMLResponse:
     """A finished job as one HTML page that needs nothing else."""
+    here.jobs.artifact(id, artifacts.ARRAYS)
     folder = here.jobs.artifact(id, artifacts.RESULT).parent
     return HTMLResponse(report.of_directory(folder), headers={"content-security-policy": report.POLICY})
 

@@ -8,7 +8,6 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from engine.scenario import toml
-from server.problems import Refusal
 from server.site import Here
 
 router = APIRouter(prefix="/api", tags=["jobs"])
@@ -31,10 +30,7 @@ def mark(id: str, body: Marks, here: Here) -> dict[str, Any]:
     marks = body.model_dump(exclude_none=True)
     if "tags" in marks:
         marks["tags"] = list(dict.fromkeys(marks["tags"]))
-    job = here.jobs.store.mark(id, **marks)
-    if job is None:
-        raise Refusal(404, "unknown-job", "there is no such job")
-    return job.public()
+    return here.jobs.mark(id, **marks).public()
 
 
 @router.get("/jobs/{id}/scenario")
