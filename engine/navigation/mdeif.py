@@ -19,7 +19,7 @@ W11's packet of 14 floats. Full states can be had; then only the launch acknowle
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -434,20 +434,15 @@ def _pair_of(record: np.ndarray, n: int) -> tuple[Moments, np.ndarray]:
 
 
 def _proper(link: Link, where: np.ndarray) -> tuple[Link, np.ndarray]:
-    """The link with C and J without negative parts, and in which trials of a mask it is of a credible size.
-
-    Honest packets give negative parts by round-off alone; a damaged one may give a step that is none.
-    """
+    """The link, and in which trials of a mask it is a step: of a credible size, C and J without negative parts."""
     parts = [link.A, link.b[..., None], link.C, link.eta[..., None], link.J]
     largest = np.max([np.abs(part).max(axis=(-2, -1), initial=0.0) for part in parts], axis=0)
     where = where & (largest < LARGEST_TERM)
     link = only_in(where, link)
-    definite = {}
-    for name in ("C", "J"):
-        values, vectors = np.linalg.eigh(getattr(link, name))
-        clipped = (vectors * np.maximum(values, 0.0)[..., None, :]) @ transpose(vectors)
-        definite[name] = np.where((values[..., 0] < 0)[..., None, None], clipped, getattr(link, name))
-    return replace(link, **definite), where
+    for part in (link.C, link.J):
+        values = np.linalg.eigvalsh(part)
+        where = where & (values[..., 0] >= -WORST_ROUND_OFF * np.abs(values).max(-1))
+    return only_in(where, link), where
 
 
 def _harmless(moments: Moments, where: np.ndarray) -> Moments:
