@@ -71,7 +71,7 @@ class Family:
     accepts: tuple[str, ...] = ()
 
 
-_FAMILY_MODULES = ("engine.navigation", "engine.pursuit", "engine.smoothing", "engine.tracking")
+_FAMILY_MODULES = ("engine.navigation", "engine.pursuit", "engine.slam", "engine.smoothing", "engine.tracking")
 
 
 def _module_members(kind: type) -> list[Any]:

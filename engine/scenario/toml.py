@@ -85,6 +85,7 @@ def validate(data: Any, *, origin: str = "") -> ScenarioBase:
         problems += _impossible(data, "")
         if problems:
             raise ScenarioError(problems)
+        assert isinstance(family, str), "anything else is a problem"
         return MODELS[family].model_validate(data | {"origin": origin})
     except ValidationError as error:
         raise ScenarioError(_problems(error, data)) from None

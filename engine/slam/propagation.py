@@ -132,25 +132,30 @@ class Propagation:
             at[v] = slice(D, D + graph.kinds[v].dim)
             D = at[v].stop
         F = at[frontals[-1]].stop
-        pieces = []
-        const: np.ndarray = np.zeros(1)
-        for number in factors:
-            factor = graph.factors[number]
-            e, J = factor.linearize(*(points.values[v] for v in factor.variables))
-            const = const - 0.5 * np.square(e).sum(-1)
-            free = [(at[v], Jv) for v, Jv in zip(factor.variables, J, strict=True) if v not in given]
-            pieces.append((e, free))
-        n = max([len(e) for e, _ in pieces] + [len(m.eta) for _, m in incoming], default=1)
-        curved = max(
-            [len(J) for _, free in pieces for _, J in free if J.ndim == 3] + [len(m.Lam) for _, m in incoming],
-            default=1,
-        )
-        Lam, eta = np.zeros((curved, D, D)), np.zeros((n, D))
-        for e, free in pieces:
-            for a, Ja in free:
-                eta[:, a] -= np.einsum("...ki,...k->...i", Ja, e)
-                for b, Jb in free:
-                    Lam[:, a, b] += np.einsum("...ki,...kj->...ij", Ja, Jb)
+        linearized = [
+            (
+                graph.factors[i].variables,
+                *graph.factors[i].linearize(*(points.values[v] for v in graph.factors[i].variables)),
+            )
+            for i in factors
+        ]
+        n = max([len(e) for _, e, _ in linearized] + [len(m.eta) for _, m in incoming], default=1)
+        curved = max([len(Jv) for _, _, J in linearized for Jv in J if Jv.ndim == 3], default=1)
+        rows = sum(e.shape[-1] for _, e, _ in linearized)
+        A, residual, row = np.zeros((curved, rows, D)), np.zeros((n, rows)), 0
+        for variables, e, J in linearized:
+            stop = row + e.shape[-1]
+            residual[:, row:stop] = e
+            for v, Jv in zip(variables, J, strict=True):
+                if v not in given:
+                    A[:, row:stop, at[v]] = Jv
+            row = stop
+        transposed = np.swapaxes(A, -1, -2)
+        Lam, eta = transposed @ A, -(transposed @ residual[..., None])[..., 0]
+        const = -0.5 * np.square(residual).sum(-1)
+        wide = max([len(Lam)] + [len(m.Lam) for _, m in incoming])
+        if wide > len(Lam):
+            Lam = np.repeat(Lam, wide, axis=0)
         for variables, message in incoming:
             index = np.concatenate([np.arange(at[v].start, at[v].stop) for v in variables])
             Lam[:, index[:, None], index] += message.Lam
@@ -164,11 +169,11 @@ class Propagation:
         half = np.swapaxes(inverse_low, -1, -2)
         cov = half @ inverse_low
         G = cov @ Lam[:, :F, F:]
-        m = np.einsum("...ij,...j->...i", cov, eta[:, :F])
-        const = const + 0.5 * np.einsum("...i,...i->...", m, eta[:, :F])
+        m = (cov @ eta[:, :F, None])[..., 0]
+        const = const + 0.5 * (m * eta[:, :F]).sum(-1)
         const = const - np.log(np.diagonal(low, axis1=-2, axis2=-1)).sum(-1)
         rest = Lam[:, F:, F:] - np.swapaxes(Lam[:, :F, F:], -1, -2) @ G
-        onward = eta[:, F:] - np.einsum("...ji,...j->...i", G, eta[:, :F])
+        onward = eta[:, F:] - (np.swapaxes(G, -1, -2) @ eta[:, :F, None])[..., 0]
         message = Message(next(self._numbers), 0.5 * (rest + np.swapaxes(rest, -1, -2)), onward, const)
         return Conditional(m, G, half), message
 

@@ -23,9 +23,15 @@ from engine.slam.propagation import Points, Propagation, Up, down
 from engine.slam.variables import LABEL, Kind
 
 #: Candidates per kernel when a beacon is drawn anew, and the most factors that refine them.
-CANDIDATES, REFINERS = 24, 10
+CANDIDATES, REFINERS = 16, 10
+#: Sweeps for each that draws beacons anew; the others move them by differences between kernels.
+REDRAWS = 3
 #: Newton steps that refine candidates, and those that settle the poses for a proposed beacon.
-REFINEMENTS, SETTLINGS = 4, 2
+REFINEMENTS, SETTLINGS = 3, 2
+#: How many times more kernels first look for a new beacon, all around.
+SCOUTS = 8
+#: The spreads between which a kernel's step is drawn when it does not follow the others, m, and the share of those.
+STEPS_M, OWN_STEPS = (0.02, 3.0), 0.3
 #: Distance (in each coordinate) below which a point of linearization is left where it is.
 SETTLED = 1e-3
 
@@ -66,18 +72,24 @@ class Solver:
         added = list(factors)
         self.graph.add(kinds, added)
         self._given = frozenset(self.graph.ambiguous())
-        late = self._enter(kinds, added)
+        wanted = self.kernels
+        if any(v in self._given for v in kinds):
+            self.kernels = SCOUTS * wanted
+            self._points.take(np.repeat(np.arange(wanted), SCOUTS))
+            self._evidence = np.repeat(self._evidence, SCOUTS)
+        late, log_q = self._enter(kinds, added)
         self._grow(order(list(self.graph.kinds), [f.variables for f in self.graph.factors], self._last(kinds)))
         before = self._known_evidence(late)
         self._settle()
-        weights = self._evidence - before
+        weights = self._evidence - before - log_q
         weights = np.exp(weights - weights.max())
         effective = float(weights.sum() ** 2 / np.square(weights).sum())
         reused = self._up.reused if self._up else 0
         accepted = 0.0
+        self.kernels = wanted
         if self._given:
             self._resample(weights / weights.sum())
-            accepted = float(np.mean([self._sweep() for _ in range(self.sweeps)]))
+            accepted = float(np.mean([self._sweep(n % REDRAWS == 0) for n in range(self.sweeps)]))
         return Step(len(self.tree.cliques), reused, effective, accepted)
 
     def beliefs(self, variables: Iterable[str] | None = None) -> dict[str, np.ndarray]:
@@ -86,6 +98,20 @@ class Solver:
         drawn = down(self.graph, self.tree, up, self._points, self._given, self.kernels, self._rng)
         found = drawn | {v: self._points.values[v] for v in self._given}
         return {v: found[v] for v in (variables if variables is not None else self.graph.kinds)}
+
+    def misfit(self) -> tuple[float, int]:
+        """Sum of squared residuals at the mode given the median kernel, and the degrees of freedom it should equal."""
+        up = self._pass()
+        mean = down(self.graph, self.tree, up, self._points, self._given, self.kernels, None)
+        at = mean | {v: self._points.values[v] for v in self._given}
+        squares, rows = np.zeros(self.kernels), np.zeros(self.kernels)
+        for f in self.graph.factors:
+            e, J = f.linearize(*(at[v] for v in f.variables))
+            felt = np.any(np.stack(np.broadcast_arrays(*(np.abs(Jv).max(-1) > 0 for Jv in J))), axis=0)
+            squares += np.where(felt, np.square(e), 0.0).sum(-1)
+            rows += np.broadcast_to(felt, e.shape).sum(-1)
+        free = sum(k.dim for k in self.graph.kinds.values() if k is not LABEL)
+        return float(np.median(squares)), round(float(np.median(rows))) - free
 
     def _last(self, kinds: dict[str, Kind]) -> list[str]:
         """What stays near the root: the newest pose, then the beacons."""
@@ -97,27 +123,55 @@ class Solver:
 
     # -- entering variables
 
-    def _enter(self, kinds: dict[str, Kind], added: list[Factor]) -> list[Factor]:
-        """Give every new variable a first point; the new factors that first points do not already account for."""
-        late, waiting = list(added), list(kinds)
+    def _enter(self, kinds: dict[str, Kind], added: list[Factor]) -> tuple[list[Factor], np.ndarray]:
+        """Give every new variable a first point.
+
+        The new factors that first points do not already account for, and the log density (N,) of the draws by which
+        those are weighed that no factor accounts for.
+        """
+        late, waiting, log_q = list(added), list(kinds), np.zeros(self.kernels)
         strata = (np.arange(self.kernels) + 0.5) / self.kernels
+        drawn: dict[str, np.ndarray] | None = None
         while waiting:
-            for v in waiting:
-                source = self._source(v, waiting, added)
-                if source is None:
-                    continue
-                values = [self._points.values.get(u, np.zeros((1, self.graph.kinds[u].dim))) for u in source.variables]
-                if v in self._given:
-                    spread = self._rng.permutation(strata)
+            ready = [(v, f) for v in waiting if (f := self._source(v, waiting, added)) is not None]
+            if not ready:
+                raise ValueError(f"nothing says where {', '.join(waiting)} might be")
+            # What is determined first, so that beacons are drawn from poses, each kernel's its own.
+            v, source = min(ready, key=lambda pair: pair[0] in self._given)
+            towards = source.variables.index(v)
+            values = [self._points.values.get(u, np.zeros((1, self.graph.kinds[u].dim))) for u in source.variables]
+            if v not in self._given:
+                strata_here = np.zeros(max(len(x) for x in values))
+            elif self.graph.kinds[v] is LABEL:
+                strata_here = self._rng.permutation(strata)
+                late = [f for f in late if f is not source] if len(source.variables) == 1 else late
+            else:
+                strata_here = self._rng.permutation(strata)
+                drawn = drawn if drawn is not None else self._drawn(set(waiting))
+                values = [drawn.get(u, x) for u, x in zip(source.variables, values, strict=True)]
+            self._points.set(v, source.sample(towards, values, strata_here, self._rng))
+            waiting.remove(v)
+            if v in self._given and self.graph.kinds[v] is not LABEL:
+                values[towards] = self._points.values[v]
+                proposal = source.log_proposal(towards, values)
+                if proposal is None:
                     late = [f for f in late if f is not source]
                 else:
-                    spread = np.zeros(max([len(x) for x in values], default=1)) if len(source.variables) > 1 else [0.0]
-                self._points.set(v, source.sample(source.variables.index(v), values, np.asarray(spread), self._rng))
-                waiting.remove(v)
-                break
-            else:
-                raise ValueError(f"nothing says where {', '.join(waiting)} might be")
-        return late
+                    log_q = log_q + proposal
+        return late, log_q
+
+    def _drawn(self, waiting: set[str]) -> dict[str, np.ndarray]:
+        """Joint draws of all poses by the factors whose variables are all known."""
+        everything, kinds, given = self.graph.factors, self.graph.kinds, self._given
+        known = [v for v in kinds if v not in waiting]
+        self.graph.factors = [f for f in everything if not waiting & set(f.variables)]
+        sequence = order(known, [f.variables for f in self.graph.factors], [v for v in known if v in given])
+        grown = tree([f.variables for f in self.graph.factors], sequence)
+        try:
+            up = Propagation().up(self.graph, grown, self._points, given)
+            return down(self.graph, grown, up, self._points, given, self.kernels, self._rng)
+        finally:
+            self.graph.factors = everything
 
     def _source(self, v: str, waiting: list[str], added: list[Factor]) -> Factor | None:
         """A factor that can draw v from what is known; one that determines it where there is one."""
@@ -175,19 +229,21 @@ class Solver:
     def _resample(self, weights: np.ndarray) -> None:
         """Systematic resampling."""
         aims = (np.arange(self.kernels) + self._rng.random()) / self.kernels
-        kept = np.minimum(np.searchsorted(np.cumsum(weights), aims), self.kernels - 1)
+        kept = np.minimum(np.searchsorted(np.cumsum(weights), aims), len(weights) - 1)
         self._points.take(kept)
         self._evidence = self._evidence[kept]
 
     # -- moves
 
-    def _sweep(self) -> float:
+    def _sweep(self, anew: bool) -> float:
         taken = []
         beacons = self.beacons
         if beacons:
             taken.append(self._cross(beacons))
-        for beacon in beacons:
-            taken.append(self._redraw(beacon))
+        for beacon in beacons if anew else []:
+            factors = [f for f in map(self.graph.factors.__getitem__, self.graph.of(beacon)) if not f.costly]
+            if factors:
+                taken.append(self._redraw(beacon, factors))
         for label in [v for v in self._given if self.graph.kinds[v] is LABEL]:
             self._relabel(label)
         return float(np.mean(taken)) if taken else 1.0
@@ -209,12 +265,14 @@ class Solver:
         return float(keep.mean())
 
     def _cross(self, beacons: list[str]) -> float:
-        """Step by the difference of two other kernels, all beacons at once (differential evolution, ter Braak 2006)."""
+        """Step all beacons by the difference of two kernels (differential evolution, ter Braak 2006), or by chance."""
         N = self.kernels
         state = np.concatenate([self._points.values[b] for b in beacons], axis=-1)
         a, b = self._rng.integers(N, size=N), self._rng.integers(N, size=N)
         scale = np.where(self._rng.random(N) < 0.2, 1.0, 2.38 / np.sqrt(2 * state.shape[-1]))
-        moved = state + scale[:, None] * (state[a] - state[b]) + 1e-4 * self._rng.standard_normal(state.shape)
+        own = np.exp(self._rng.uniform(*np.log(STEPS_M), size=N))[:, None] * self._rng.standard_normal(state.shape)
+        others = scale[:, None] * (state[a] - state[b]) + STEPS_M[0] * self._rng.standard_normal(state.shape)
+        moved = state + np.where(self._rng.random((N, 1)) < OWN_STEPS, own, others)
         parts = np.split(moved, np.cumsum([self.graph.kinds[b].dim for b in beacons])[:-1], axis=-1)
         return self._try(dict(zip(beacons, parts, strict=True)))
 
@@ -225,9 +283,8 @@ class Solver:
         drawn = factor.sample(len(values) - 1, values, self._rng.random(self.kernels), self._rng)
         self._try({label: drawn})
 
-    def _redraw(self, beacon: str) -> float:
-        """Draw a beacon from kernels around the places that the factors on it, given the poses, agree on."""
-        factors = [self.graph.factors[i] for i in self.graph.of(beacon)]
+    def _redraw(self, beacon: str, factors: list[Factor]) -> float:
+        """Draw a beacon from kernels around the places that factors on it, given the poses, agree on."""
         source = factors[self._rng.integers(len(factors))]
         if len(factors) > REFINERS:
             factors = [factors[i] for i in self._rng.choice(len(factors), REFINERS, replace=False)]

@@ -16,12 +16,13 @@ class Factor:
 
     A subclass gives `residual`, whitened, so that the density of the values is exp(-|residual|^2 / 2), and `sample`.
     `linear` promises a constant Jacobian; `determines` that any one variable follows from the others (a prior,
-    odometry), as it does not from a range.
+    odometry), as it does not from a range; `costly` that it should not be asked about thousands of places.
     """
 
     variables: tuple[str, ...]
     linear: bool = field(default=False, kw_only=True)
     determines: bool = field(default=False, kw_only=True)
+    costly: bool = field(default=False, kw_only=True)
 
     @property
     def determined(self) -> tuple[str, ...]:
@@ -45,6 +46,10 @@ class Factor:
     def log_density(self, *values: np.ndarray) -> np.ndarray:
         """Log of the density (...,), up to a constant."""
         return -0.5 * np.square(self.residual(*values)).sum(-1)
+
+    def log_proposal(self, towards: int, values: list[np.ndarray]) -> np.ndarray | None:
+        """Log density (...,) with which `sample` draws variable `towards`, where that is not this factor's own."""
+        return None
 
     def linearize(self, *values: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """Residual (..., k) and its Jacobians [(..., k, d)], by central differences unless a subclass knows them."""

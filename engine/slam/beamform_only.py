@@ -1,0 +1,35 @@
+"""Arrays on dead-reckoned poses, their beacon densities multiplied: sonar without SLAM (C19 Fig. 5-17, right)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from engine.slam.densities import Kde, fit
+from engine.slam.log import SlamLog
+from engine.slam.mission import SlamMission
+from engine.slam.products import product
+from engine.slam.reckoning import reckon
+from engine.slam.run import Moment, Options, over_trials
+
+
+def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
+    """The product of all arrays' forward densities so far, after each array."""
+    options = Options.model_validate(dict(mission.options.get("beamform_only", {})))
+    N = options.kernels
+    rng = np.random.default_rng(np.random.SeedSequence([mission.scenario.seed, trial]))
+    poses = reckon(log, N, rng)
+    densities: dict[str, list[Kde]] = {}
+    beacons: dict[str, np.ndarray] = {}
+    for n, a in enumerate(log.arrays, start=1):
+        elements = np.swapaxes(poses[list(a.poses)], 0, 1)
+        strata = rng.permutation((np.arange(N) + 0.5) / N)
+        densities.setdefault(a.beacon, []).append(fit(a.array.sample_beacon(elements, rng, strata)))
+        beacons[a.beacon] = product(densities[a.beacon], N, rng)
+        end = n == len(log.arrays)
+        notes = tuple(f"array from pose {b.poses[0]}: {c}" for b in log.arrays for c in b.cautions) if end else ()
+        yield Moment(a.poses[-1], dict(beacons), n / len(log.arrays), poses if end else None, notes)
+
+
+run = over_trials(solve)

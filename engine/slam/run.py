@@ -1,0 +1,174 @@
+"""Runs one algorithm over a mission's trials: the graph grows, beliefs are kept as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from scipy.stats import chi2
+
+from engine.registry import Progress
+from engine.slam.building import Plan, growths, name
+from engine.slam.densities import fit, from_gaussian
+from engine.slam.log import SlamLog
+from engine.slam.mission import SlamMission
+from engine.slam.solver import Solver
+from engine.tracks import Belief, Samples, Series, Tracks
+
+#: Chance below which a graph's residuals are said not to fit its model.
+UNLIKELY = 1e-6
+
+
+class Options(BaseModel):
+    """What a scenario may choose for a kernel-based estimator, under [options.NAME]."""
+
+    model_config = ConfigDict(extra="forbid")
+    kernels: int = Field(100, ge=20, le=5000, description="kernels of each belief")
+    sweeps: int = Field(3, ge=1, le=100, description="moves of the kernels after each extension")
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Beliefs of the beacons, each (N, 2), once a pose was reached; `last` holds all poses (P, N, 2) in the end."""
+
+    pose: int
+    beacons: dict[str, np.ndarray]
+    done: float
+    last: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
+
+
+#: From a trial's log, its mission and its number to the moments of its solution.
+Solve = Callable[[SlamLog, SlamMission, int], Iterator[Moment]]
+
+
+def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], Tracks]:
+    """An algorithm that grows the graph of a plan with the kernel solver."""
+
+    def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
+        options = Options.model_validate(dict(mission.options.get(algorithm, {})))
+        seed = np.random.SeedSequence([mission.scenario.seed, trial])
+        solver = Solver(options.kernels, seed, options.sweeps)
+        total = max(len(log.arrays) if plan.measurements == "arrays" else len(log.pings) + len(log.readings), 1)
+        done = 0
+        for growth in growths(log, plan, mission.time_s, mission.scenario.outlier_share):
+            solver.extend(growth.kinds, growth.factors)
+            done += growth.measurements
+            last = done >= total
+            beacons = solver.beliefs(solver.beacons)
+            if not last:
+                yield Moment(growth.pose, beacons, done / total)
+                continue
+            beliefs = solver.beliefs()
+            poses = np.stack([beliefs[name(k)][:, :2] for k in range(log.poses)])
+            yield Moment(growth.pose, {b: beliefs[b] for b in solver.beacons}, 1.0, poses, _doubts(log, plan, solver))
+
+    return over_trials(solve)
+
+
+def _doubts(log: SlamLog, plan: Plan, solver: Solver) -> tuple[str, ...]:
+    notes = []
+    if plan.measurements == "arrays":
+        doubtful = [a for a in log.arrays if a.cautions]
+        if doubtful:
+            first = doubtful[0]
+            where = f"{len(doubtful)} of {len(log.arrays)} arrays, such as the one from pose {first.poses[0]}"
+            notes.append(f"{where}: {'; '.join(first.cautions)}")
+    squares, freedom = solver.misfit()
+    if freedom > 0 and chi2.sf(squares, freedom) < UNLIKELY:
+        notes.append(
+            f"residuals do not fit the model: their squares sum to {squares:.0f} where about {freedom} was expected; "
+            "is a clock, the sound speed or a noise wrong?"
+        )
+    return tuple(notes)
+
+
+def over_trials(solve: Solve) -> Callable[[SlamMission, Progress], Tracks]:
+    """An algorithm that solves trial by trial."""
+
+    def run(mission: SlamMission, progress: Progress) -> Tracks:
+        histories = []
+        for k, trial in enumerate(mission.trials):
+            history = []
+            for moment in solve(mission.log(k), mission, trial):
+                partial = _partial(mission, moment) if k == 0 else None
+                progress((k + moment.done) / len(mission.trials), partial)
+                history.append(moment)
+            histories.append(history)
+        return _tracks(mission, histories)
+
+    return run
+
+
+def _partial(mission: SlamMission, moment: Moment) -> dict[str, Any] | None:
+    """The first trial's new beliefs for someone watching: of the beacons as they come, of the vehicle in the end."""
+    at = [float(mission.time_s[moment.pose])]
+    if moment.last is None:
+        return {
+            "time_s": at,
+            "mean": {b: [x.mean(0).tolist()] for b, x in moment.beacons.items()},
+            "cov": {b: [_packed(np.cov(x.T))] for b, x in moment.beacons.items()},
+        }
+    mean, cov = _moments(moment.last)
+    return {
+        "time_s": mission.time_s.tolist(),
+        "mean": {mission.vehicle: mean.tolist()},
+        "cov": {mission.vehicle: [_packed(c) for c in cov]},
+    }
+
+
+def _packed(cov: np.ndarray) -> list[float]:
+    return [float(cov[0, 0]), float(cov[0, 1]), float(cov[1, 1])]
+
+
+def _moments(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (T, 2) and covariance (T, 2, 2) of draws (T, N, 2)."""
+    mean = points.mean(-2)
+    d = points - mean[..., None, :]
+    return mean, np.einsum("...ni,...nj->...ij", d, d) / (points.shape[-2] - 1) + 1e-9 * np.eye(2)
+
+
+def _tracks(mission: SlamMission, histories: list[list[Moment]]) -> Tracks:
+    T = len(mission.time_s)
+    ends = [_moments(h[-1].last) for h in histories if h[-1].last is not None]
+    beliefs = {mission.vehicle: Belief(np.stack([m for m, _ in ends]), np.stack([c for _, c in ends]))}
+    samples: dict[str, Samples] = {}
+    series: dict[str, Series] = {}
+    for beacon in mission.beacons:
+        heard = [[m for m in h if beacon in m.beacons] for h in histories]
+        if not all(heard):
+            continue
+        poses = [m.pose for m in heard[0]]
+        points = np.stack([[m.beacons[beacon] for m in h] for h in heard])
+        samples[beacon] = Samples(mission.time_s[poses], points)
+        # A belief holds until the next one; what is asked of before the first is answered by the first.
+        held = np.maximum(np.searchsorted(poses, np.arange(T), side="right") - 1, 0)
+        mean, cov = _moments(points)
+        beliefs[beacon] = Belief(mean[:, held], cov[:, held])
+        series |= _curves(mission, beacon, points, held)
+    notes = tuple(dict.fromkeys(note for h in histories for note in h[-1].notes))
+    return Tracks(beliefs, samples=samples, series=series, notes=(*mission.notes, *notes))
+
+
+def _curves(mission: SlamMission, beacon: str, points: np.ndarray, held: np.ndarray) -> dict[str, Series]:
+    """Errors of the mean and of the mode (C19 eq. 5.2), and the divergence from a Gaussian (eq. 5.3)."""
+    trials, K, T = points.shape[0], points.shape[1], len(held)
+    modes, apart = np.empty((trials, K, 2)), np.empty((trials, K))
+    for t in range(trials):
+        for k in range(K):
+            kde = fit(points[t, k])
+            modes[t, k] = kde.mode
+            apart[t, k] = from_gaussian(kde, np.random.default_rng([t, k]))
+    curves = {f"divergence/{beacon}": Series("Divergence from a Gaussian", "nats", apart[:, held], (beacon,))}
+    truth = mission.truth.get(beacon)
+    if truth is None:
+        return curves
+    off = np.linalg.norm(modes[:, held] - truth, axis=-1)
+    final = np.full((trials, T), np.nan)
+    final[:, -1] = off[:, -1]
+    curves[f"mode_error_m/{beacon}"] = Series("Error of the densest place", "m", off, (beacon,))
+    curves[f"final_mode_error_m/{beacon}"] = Series("Error of the densest place at the end", "m", final, (beacon,))
+    return curves
