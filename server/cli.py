@@ -25,10 +25,20 @@ def parser() -> argparse.ArgumentParser:
     kinds = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     serve = kinds.add_parser("serve", help="open the dashboard on this machine")
-    serve.add_argument("--host", default="127.0.0.1", help="address to listen on; other than loopback asks for a token")
-    serve.add_argument("--port", type=_port, default=8000, help="port to listen on, 0 for any free one (default 8000)")
-    serve.add_argument("--data", type=Path, metavar="DIR", help="where jobs and scenarios are kept")
-    serve.add_argument("--cluster", metavar="tcp://…", help="run jobs on this Dask scheduler's workers")
+    _service(serve)
+    serve.add_argument(
+        "--keep-days", type=_positive, metavar="N", help="delete jobs that ended so long ago, not pinned"
+    )
+    serve.add_argument(
+        "--keep-gb", type=_positive, metavar="N", help="delete the oldest jobs, not pinned, when all take more"
+    )
+    serve.add_argument("--log-format", choices=("text", "json"), default="text", help="how log lines look (stderr)")
+    serve.add_argument(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        default="warning",
+        help="what is logged; info has a line for every request",
+    )
     serve.set_defaults(run=commands.serve)
 
     run = kinds.add_parser("run", help="run a scenario and compare its algorithms")
@@ -60,6 +70,10 @@ def parser() -> argparse.ArgumentParser:
     listing.add_argument("--json", action="store_true", help="as JSON")
     listing.set_defaults(run=commands.listing)
 
+    doctor = kinds.add_parser("doctor", help="check what the dashboard needs on this machine")
+    _service(doctor)
+    doctor.set_defaults(run=commands.doctor)
+
     report = kinds.add_parser("report", help="write a result as one HTML page")
     report.add_argument("source", metavar="JOB|DIR", help="a job of the server, or a folder that `run --out` wrote")
     report.add_argument("--out", type=Path, metavar="FILE.html", required=True, help="file to write")
@@ -87,6 +101,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
+def _service(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--host", default="127.0.0.1", help="address to listen on; other than loopback asks for a token"
+    )
+    command.add_argument(
+        "--port", type=_port, default=8000, help="port to listen on, 0 for any free one (default 8000)"
+    )
+    command.add_argument("--data", type=Path, metavar="DIR", help="where jobs and scenarios are kept")
+    command.add_argument(
+        "--workers", type=_count, metavar="N", help="worker processes (default: one per core, two at least)"
+    )
+    command.add_argument("--cluster", metavar="tcp://…", help="run jobs on this Dask scheduler's workers instead")
+    for what, holds in (("ca", "the authority's certificate"), ("cert", "our certificate"), ("key", "our private key")):
+        command.add_argument(f"--cluster-{what}", type=Path, metavar="PEM", help=f"{holds}, for a cluster at tls://…")
+
+
 def _scenario(command: argparse.ArgumentParser) -> None:
     command.add_argument("scenario", metavar="SCENARIO", help="shipped name, file, or folder with a scenario.toml")
     command.add_argument("--trials", metavar="N", help="Monte Carlo trials instead of the scenario's")
@@ -110,6 +140,13 @@ def _port(text: str) -> int:
     if not 0 <= port < 65536:
         raise argparse.ArgumentTypeError("a port is a number from 0 to 65535")
     return port
+
+
+def _positive(text: str) -> float:
+    number = float(text)
+    if not 0 < number < float("inf"):
+        raise argparse.ArgumentTypeError("a number above 0 is needed")
+    return number
 
 
 def _count(text: str) -> int:

@@ -67,7 +67,7 @@ async def _own_cluster(settings: Settings) -> LocalCluster:
             memory_limit=settings.worker_memory or "auto",
             dashboard_address=None,  # pyright: ignore[reportArgumentType]
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-            silence_logs=logging.CRITICAL,
+            silence_logs=logging.CRITICAL + 1,
             asynchronous=True,
         )  # pyright: ignore[reportGeneralTypeIssues]
 
@@ -121,9 +121,8 @@ class Cluster:
             await asyncio.sleep(AGAIN_S)
 
     async def _join(self, address: Any, hear: Callable[[dict[str, Any]], None]) -> None:
-        self._client = await Client(  # pyright: ignore
-            address, asynchronous=True, name="coopnav", timeout=5, security=_security(self._settings)
-        )
+        self._client = Client(address, asynchronous=True, name="coopnav", timeout=5, security=_security(self._settings))
+        await self._client  # pyright: ignore[reportGeneralTypeIssues]
         self.client.subscribe_topic(self._topic, lambda event: hear(event[1]))
         self.client.subscribe_topic("all", lambda event: self._told(event[1]))
         await self.client.register_plugin(work.Prepared())  # pyright: ignore

@@ -7,7 +7,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
@@ -19,6 +19,9 @@ from engine.scenario.models import ScenarioBase
 from engine.scenario.navigation import NavigationScenario
 from server import table
 
+if TYPE_CHECKING:
+    from server.settings import Settings
+
 
 class Usage(Exception):
     """Input that cannot be used, in words for the person at the keyboard."""
@@ -27,15 +30,46 @@ class Usage(Exception):
 def serve(chosen: Namespace) -> int:
     """Serve the dashboard until told to stop."""
     from server import serving
-    from server.settings import Settings, default_data
 
     try:
-        serving.serve(
-            Settings(data=chosen.data or default_data(), host=chosen.host, port=chosen.port, cluster=chosen.cluster)
+        settings = _settings(
+            chosen,
+            token=serving.given_token(),
+            keep_days=chosen.keep_days,
+            keep_bytes=int(chosen.keep_gb * 1e9) if chosen.keep_gb else None,
         )
+        serving.serve(settings, chosen.log_format, chosen.log_level)
     except serving.CannotServe as error:
         raise Usage(str(error)) from None
     return 0
+
+
+def doctor(chosen: Namespace) -> int:
+    """Check what the dashboard needs, a line each; 1 where something keeps it from working."""
+    from server.doctor import findings
+
+    failing = 0
+    for finding in findings(_settings(chosen)):
+        failing += finding.mark == "FAIL"
+        print(f"{finding.mark:4}  {finding.what}: {finding.found}", flush=True)
+    print("something is missing" if failing else "all is well", file=sys.stderr)
+    return 1 if failing else 0
+
+
+def _settings(chosen: Namespace, **others: Any) -> Settings:
+    from server.settings import Settings, default_data
+
+    tls = {name: getattr(chosen, name) for name in ("cluster_ca", "cluster_cert", "cluster_key")}
+    given = [path for path in tls.values() if path is not None]
+    if given and (len(given) < len(tls) or chosen.cluster is None):
+        raise Usage("--cluster-ca, --cluster-cert and --cluster-key go together, with a --cluster at tls://…")
+    for path in given:
+        if not path.is_file():
+            raise Usage(f"{path} is not there")
+    if chosen.workers is not None:
+        others["workers"] = chosen.workers
+    data = chosen.data or default_data()
+    return Settings(data=data, host=chosen.host, port=chosen.port, cluster=chosen.cluster, **tls, **others)
 
 
 def run(chosen: Namespace) -> int:

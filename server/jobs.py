@@ -21,7 +21,7 @@ from engine import runner
 from engine.scenario import toml
 from engine.scenario.errors import ScenarioError
 from engine.scenario.models import ScenarioBase
-from server import artifacts, cost, view, work
+from server import artifacts, cost, logs, view, work
 from server.cluster import Cluster
 from server.flow import Flow
 from server.journal import Journal
@@ -168,6 +168,8 @@ class Jobs:
             kept, new = await asyncio.to_thread(self.store.add, job)
             if not new:
                 return _same(kept, digest)
+            logs.job.set(job.id)
+            log.info("job %s is accepted", job.id)
             self._begin(kept)
             return kept
         finally:
@@ -293,6 +295,7 @@ class Jobs:
         task.add_done_callback(lambda _: (self._tasks.pop(job.id, None), self._clients.pop(job.id, None)))
 
     async def _run(self, job: Job) -> None:
+        logs.job.set(job.id)
         try:
             await self._compute(job)
         except asyncio.CancelledError:
@@ -312,6 +315,7 @@ class Jobs:
             try:
                 await self.journal.flush()
                 await asyncio.to_thread(self.store.change, id, **values)
+                log.info("job %s is %s", id, values["state"])
             except sqlite3.OperationalError as error:
                 log.error("job %s: cannot record %s: %s", id, values.get("state"), error)
                 await asyncio.sleep(AGAIN_S)
@@ -344,6 +348,7 @@ class Jobs:
             await plan.started.wait()
             if job.state == "queued":
                 await asyncio.to_thread(self.store.change, job.id, state="running", started_at=now())
+                log.info("job %s is running", job.id)
                 self.journal.wake()
             async with limit:
                 await plan.ended

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import secrets
 import socket
 import sys
@@ -17,6 +18,9 @@ from server.app import create_app
 from server.patience import impatient
 from server.settings import Settings
 
+#: Where a token may be given that lasts longer than one run.
+TOKEN_VARIABLE = "COOPNAV_TOKEN"
+SHORTEST_TOKEN = 16
 #: Connections at once; more are answered 503.
 MOST_CONNECTIONS = 1000
 
@@ -33,6 +37,14 @@ class _Server(uvicorn.Server):
         if site is not None:
             site.journal.close()
         await super().shutdown(sockets)
+
+
+def given_token() -> str | None:
+    """The token that the environment asks for; None where it asks for none."""
+    token = os.environ.get(TOKEN_VARIABLE, "").strip()
+    if token and len(token) < SHORTEST_TOKEN:
+        raise CannotServe(f"the token in {TOKEN_VARIABLE} is short; use at least {SHORTEST_TOKEN} characters")
+    return token or None
 
 
 def listen(settings: Settings) -> socket.socket:
@@ -68,7 +80,8 @@ def configured(app: Any, settings: Settings) -> uvicorn.Config:
 
 def serve(settings: Settings, log_format: str = "text", log_level: str = "warning") -> None:
     """Serve until interrupted; prints the address to open."""
-    if not settings.loopback and settings.token is None:
+    given = settings.token is not None
+    if not settings.loopback and not given:
         settings = replace(settings, token=secrets.token_urlsafe(24))
     try:
         settings.data.mkdir(parents=True, exist_ok=True)
@@ -79,16 +92,16 @@ def serve(settings: Settings, log_format: str = "text", log_level: str = "warnin
     listener = listen(settings)
     settings = replace(settings, port=listener.getsockname()[1])
     logs.write(log_format, log_level)
-    print(f"coopnav is open at {address(settings)}", flush=True)
+    print(f"coopnav is open at {address(settings, shown=not given)}", flush=True)
     print(f"jobs and scenarios are kept in {settings.data}; Ctrl-C ends the server", file=sys.stderr, flush=True)
     config = configured(create_app(settings), settings)
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(_Server(config).serve(sockets=[listener]))
 
 
-def address(settings: Settings) -> str:
-    """What to open in a browser."""
+def address(settings: Settings, shown: bool = True) -> str:
+    """What to open in a browser; a token that was given from outside is not written into logs."""
     host = socket.gethostname() if settings.host in ("0.0.0.0", "::") else settings.host
     host = f"[{host}]" if ":" in host else host
-    token = f"/?token={settings.token}" if settings.token else "/"
+    token = "/" if not settings.token else f"/?token={settings.token if shown else '…'}"
     return f"http://{host}:{settings.port}{token}"
