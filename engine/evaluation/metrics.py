@@ -61,7 +61,8 @@ def evaluate(
     mean at the last time; sigma_growth its mean over the last quarter of the mission relative to the second, above
     one where uncertainty keeps growing; anees the mean over times of the NEES averaged over trials; max_deviation_m the
     largest distance over trials and times between the mean and the benchmark's. A series of one subject becomes a
-    metric of the same name, its mean over trials and times. Undefined or infinite figures are None.
+    metric of the same name, its mean over trials and times, and NAME_interval, the 95 % interval of that mean over
+    trials. Undefined or infinite figures are None.
     """
     benchmark = results[centralized].beliefs if centralized is not None and centralized in results else {}
     return {
@@ -121,7 +122,18 @@ def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: 
         if curve.subjects == (subject,) and what not in metrics:
             known = curve.value[np.isfinite(curve.value)]
             metrics[what] = number(known.mean()) if known.size else None
+            metrics[f"{what}_interval"] = _interval(curve.value)
     return metrics
+
+
+def _interval(value: np.ndarray) -> list[float | None] | None:
+    """The 95 % interval over trials of a series' mean (trials, T); None for fewer than two trials that have one."""
+    having = np.isfinite(value).any(axis=1)
+    if having.sum() < 2:
+        return None
+    mean = np.nanmean(value[having], axis=1)
+    half = 1.96 * mean.std(ddof=1) / np.sqrt(len(mean))
+    return [number(mean.mean() - half), number(mean.mean() + half)]
 
 
 def _error(truth: np.ndarray, belief: Belief) -> SubjectMetrics:

@@ -133,7 +133,7 @@ def compress(readings: list[Readings], breakpoints_s: np.ndarray, psd: float, tr
     kind = np.concatenate([np.full(r.time_s.size, i) for i, r in enumerate(readings)]) if readings else time
     row = np.concatenate([np.arange(r.time_s.size) for r in readings]) if readings else time
     order = np.argsort(time, kind="stable")
-    order = order[(time[order] >= breakpoints_s[0]) & (time[order] <= breakpoints_s[-1])]
+    order = order[(time[order] >= breakpoints_s[0]) & (time[order] <= breakpoints_s[-1]) & (K > 0)]
     time, kind, row = time[order], kind[order], row[order]
     segment = np.clip(np.searchsorted(breakpoints_s, time, side="left") - 1, 0, K - 1)
     count = np.bincount(segment, minlength=K)

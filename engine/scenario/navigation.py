@@ -119,6 +119,8 @@ def _network(scenario: NavigationScenario):
                 yield Problem(
                     f"{key}.at_s", f"{slot.at_s:g} s is outside the cycle of {network.tdma.cycle_s:g} s", "give less"
                 )
+            if slot in network.tdma.slots[:i]:
+                yield Problem(key, f"{slot.vehicle!r} sends twice at {slot.at_s:g} s", "leave one out")
         if not simulated:
             yield Problem("network.tdma", "a recorded mission has its own broadcasts", "leave it out")
     if isinstance(network.loss, RecordedLoss | FixedLoss):

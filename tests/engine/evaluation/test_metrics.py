@@ -134,3 +134,14 @@ def test_without_a_reference_the_ranges_speak():
     low, high = found["ranges"]["nis_interval"]
     assert low < found["ranges"]["mean_nis"] < high
     assert "Of 500 ranges 500 passed the gate" in found["explanation"]
+
+
+def test_a_series_of_one_subject_is_a_metric_with_the_interval_of_its_mean():
+    """Means 1, 2 and 3 of three trials; a fourth has none."""
+    value = np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [np.nan, 3.0, np.nan], [np.nan, np.nan, np.nan]])
+    found = scores(None, Tracks({"iver": BELIEF}, series={"delay/iver": Series("", "s", value, ("iver",))}))
+    half = 1.96 / np.sqrt(3)
+    assert found["delay"] == pytest.approx((3 + 6 + 3) / 7)
+    assert found["delay_interval"] == pytest.approx([2 - half, 2 + half])
+    alone = scores(None, Tracks({"iver": BELIEF}, series={"delay/iver": Series("", "s", value[:1], ("iver",))}))
+    assert alone["delay_interval"] is None

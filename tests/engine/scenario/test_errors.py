@@ -57,6 +57,7 @@ def put(path: str, value: Any) -> dict[str, Any]:
         ("network.links", [["iver28"]], "network.links[0]", "2 items"),
         ("network.tdma.slots.3.vehicle", "nobody", "network.tdma.slots[3].vehicle", "no vehicle named 'nobody'"),
         ("network.tdma.slots.3.at_s", 145, "network.tdma.slots[3].at_s", "outside the cycle"),
+        ("network.tdma.slots.3.at_s", 0, "network.tdma.slots[3]", "twice at 0 s"),
         ("network.tdma.cycle_s", 1e-9, "network.tdma.cycle_s", "too many"),
         ("network.loss", 1.5, "network.loss", "less than or equal to 1"),
         ("network.loss", {"kind": "burst"}, "network.loss", "did you mean 'bursty'"),
