@@ -94,7 +94,7 @@ def validate(data: Any, *, origin: str = "") -> ScenarioBase:
 
 
 def _impossible(place: Any, key: str) -> Iterator[Problem]:
-    """Every NaN or infinity in nested tables, and every integer beyond TOML's 64 bits."""
+    """Every value that TOML has not: NaN, infinities, integers beyond 64 bits, null in lists and in free tables."""
     if isinstance(place, dict):
         for name, value in place.items():
             yield from _impossible(value, _join(key, str(name)))
@@ -105,6 +105,8 @@ def _impossible(place: Any, key: str) -> Iterator[Problem]:
         yield Problem(key, f"is {place}", "give a finite number")
     elif isinstance(place, int) and not -(2**63) <= place < 2**63:
         yield Problem(key, f"is an integer of {place.bit_length()} bits", "give one of at most 64")
+    elif place is None and (key.endswith("]") or key.startswith("options.")):
+        yield Problem(key, "is null", "leave it out")
 
 
 def dumps(scenario: ScenarioBase) -> str:

@@ -62,6 +62,8 @@ def put(path: str, value: Any) -> dict[str, Any]:
         ("network.loss", 1.5, "network.loss", "less than or equal to 1"),
         ("network.loss", {"kind": "burst"}, "network.loss", "did you mean 'bursty'"),
         ("network.loss", {"kind": "bursty", "mean_good_s": 1}, "network.loss.mean_bad_s", "is missing"),
+        ("options", {"deif": {"delayed_state": None}}, "options.deif.delayed_state", "null"),
+        ("options", {"deif": {"delayed_state": [1, None]}}, "options.deif.delayed_state[1]", "null"),
         ("mission", {"kind": "recorded"}, "mission", 'format = "csv"'),
         ("claims.0.operator", "!=", "claims[0].operator", "'<'"),
         ("claims.0.bound", 3, "claims[0].bound", "one thing"),
