@@ -30,6 +30,12 @@ class Graph:
         self.kinds |= kinds
         self.factors += added
 
+    def forget(self, names: Iterable[str], instead: Factor) -> None:
+        """Take variables out, with all factors on them, for which another factor comes first."""
+        gone = set(names)
+        self.factors = [instead, *(f for f in self.factors if not gone & set(f.variables))]
+        self.kinds = {v: kind for v, kind in self.kinds.items() if v not in gone}
+
     def of(self, variable: str) -> list[int]:
         """Numbers of the factors on a variable."""
         return [i for i, f in enumerate(self.factors) if variable in f.variables]

@@ -51,6 +51,9 @@ class Points:
         self.values[variable] = value
         self.versions[variable] = next(self._counter)
 
+    def drop(self, variable: str) -> None:
+        del self.values[variable], self.versions[variable]
+
     def take(self, kept: np.ndarray) -> None:
         """Keep these kernels (N,), numbers that may repeat; points shared by all stay as they are."""
         for variable, value in self.values.items():
@@ -106,7 +109,7 @@ class Propagation:
             found = self._kept.get(key)
             reused += found is not None
             if found is None:
-                found = self._eliminate(graph, frontals, separator, homes[i], incoming[i], points, given)
+                found = self.eliminate(graph, frontals, separator, homes[i], incoming[i], points, given)
             kept[key] = found
             conditionals[i], message = found
             if separator:
@@ -117,7 +120,7 @@ class Propagation:
         self._kept = kept
         return Up(conditionals, evidence, reused)
 
-    def _eliminate(
+    def eliminate(
         self,
         graph: Graph,
         frontals: list[str],
@@ -127,6 +130,7 @@ class Propagation:
         points: Points,
         given: frozenset[str],
     ) -> tuple[Conditional, Message]:
+        """One clique: factors by number and messages on its variables, to its conditional and its own message."""
         at, D = {}, 0
         for v in (*frontals, *separator):
             at[v] = slice(D, D + graph.kinds[v].dim)

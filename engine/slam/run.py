@@ -28,6 +28,7 @@ class Options(BaseModel):
     model_config = ConfigDict(extra="forbid")
     kernels: int = Field(100, ge=20, le=5000, description="kernels of each belief")
     sweeps: int = Field(3, ge=1, le=100, description="moves of the kernels after each extension")
+    lag: int | None = Field(None, ge=20, le=5000, description="poses kept; older ones are marginalized (none: all)")
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
     def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
         options = Options.model_validate(dict(mission.options.get(algorithm, {})))
         seed = np.random.SeedSequence([mission.scenario.seed, trial])
-        solver = Solver(options.kernels, seed, options.sweeps)
+        solver = Solver(options.kernels, seed, options.sweeps, options.lag)
         total = max(len(log.arrays) if plan.measurements == "arrays" else len(log.pings) + len(log.readings), 1)
         done = 0
         for growth in growths(log, plan, mission.time_s, mission.scenario.outlier_share):

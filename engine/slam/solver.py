@@ -6,6 +6,9 @@ explains everything measured: its evidence. When factors arrive, kernels are wei
 evidence, resampled, and moved by Markov chain steps that leave the posterior as it is: draws towards one beacon from
 the factors on it (batch Gibbs, C19 eq. 4.99), differences between other kernels, and new labels of mixtures. Poses are
 drawn in the end, jointly, from the root down.
+
+With a lag, poses that are older are drawn and marginalized: what they said of those that stay and of the beacons
+becomes one Gaussian for each kernel, linearized where the kernel then was. Work and memory no longer grow.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ import numpy as np
 from engine.slam.bayes_tree import BayesTree, tree
 from engine.slam.elimination import order
 from engine.slam.factors.factor import Factor
+from engine.slam.factors.remembered import remembered
 from engine.slam.graph import Graph
 from engine.slam.propagation import Points, Propagation, Up, down
 from engine.slam.variables import LABEL, Kind
@@ -32,6 +36,8 @@ REFINEMENTS, SETTLINGS = 3, 2
 SCOUTS = 8
 #: The spreads between which a kernel's step is drawn when it does not follow the others, m, and the share of those.
 STEPS_M, OWN_STEPS = (0.02, 3.0), 0.3
+#: Poses marginalized at a time, in one dense step.
+AT_ONCE = 16
 #: Distance (in each coordinate) below which a point of linearization is left where it is.
 SETTLED = 1e-3
 
@@ -49,16 +55,21 @@ class Step:
 class Solver:
     """Grows a graph and keeps its beliefs; the same seed and extensions give the same kernels."""
 
-    def __init__(self, kernels: int = 100, seed: int | np.random.SeedSequence = 0, sweeps: int = 4) -> None:
+    def __init__(
+        self, kernels: int = 100, seed: int | np.random.SeedSequence = 0, sweeps: int = 4, lag: int | None = None
+    ) -> None:
         if kernels < 4:
             raise ValueError(f"a belief needs at least 4 kernels, got {kernels}")
-        self.kernels, self.sweeps = kernels, sweeps
+        if lag is not None and lag < 2:
+            raise ValueError(f"at least 2 poses must stay, got a lag of {lag}")
+        self.kernels, self.sweeps, self.lag = kernels, sweeps, lag
         self.graph = Graph()
         self.tree = BayesTree([], {})
         self._rng = np.random.default_rng(seed)
         self._points = Points()
         self._propagation = Propagation()
         self._given: frozenset[str] = frozenset()
+        self._past: dict[str, np.ndarray] = {}
         self._evidence = np.zeros(kernels)
         self._up: Up | None = None
 
@@ -75,8 +86,7 @@ class Solver:
         wanted = self.kernels
         if any(v in self._given for v in kinds):
             self.kernels = SCOUTS * wanted
-            self._points.take(np.repeat(np.arange(wanted), SCOUTS))
-            self._evidence = np.repeat(self._evidence, SCOUTS)
+            self._take(np.repeat(np.arange(wanted), SCOUTS))
         late, log_q = self._enter(kinds, added)
         self._grow(order(list(self.graph.kinds), [f.variables for f in self.graph.factors], self._last(kinds)))
         before = self._known_evidence(late)
@@ -90,14 +100,19 @@ class Solver:
         if self._given:
             self._resample(weights / weights.sum())
             accepted = float(np.mean([self._sweep(n % REDRAWS == 0) for n in range(self.sweeps)]))
+        if self.lag is not None:
+            self._forget(self.lag)
         return Step(len(self.tree.cliques), reused, effective, accepted)
 
     def beliefs(self, variables: Iterable[str] | None = None) -> dict[str, np.ndarray]:
-        """Joint draws (N, d) of these variables, one for each kernel; of all without an argument."""
+        """Joint draws (N, d) of these variables, one for each kernel; of all without an argument.
+
+        Of poses older than the lag they are those of when they were marginalized.
+        """
         up = self._pass()
         drawn = down(self.graph, self.tree, up, self._points, self._given, self.kernels, self._rng)
-        found = drawn | {v: self._points.values[v] for v in self._given}
-        return {v: found[v] for v in (variables if variables is not None else self.graph.kinds)}
+        found = self._past | drawn | {v: self._points.values[v] for v in self._given}
+        return {v: found[v] for v in (variables if variables is not None else found)}
 
     def misfit(self) -> tuple[float, int]:
         """Sum of squared residuals at the mode given the median kernel, and the degrees of freedom it should equal."""
@@ -115,7 +130,7 @@ class Solver:
 
     def _last(self, kinds: dict[str, Kind]) -> list[str]:
         """What stays near the root: the newest pose, then the beacons."""
-        newest = [v for v in kinds if v not in self._given][-1:]
+        newest = [v for v in kinds or self.graph.kinds if v not in self._given][-1:]
         return newest + [v for v in self.graph.kinds if v in self._given]
 
     def _grow(self, sequence: list[str]) -> None:
@@ -229,9 +244,40 @@ class Solver:
     def _resample(self, weights: np.ndarray) -> None:
         """Systematic resampling."""
         aims = (np.arange(self.kernels) + self._rng.random()) / self.kernels
-        kept = np.minimum(np.searchsorted(np.cumsum(weights), aims), len(weights) - 1)
+        self._take(np.minimum(np.searchsorted(np.cumsum(weights), aims), len(weights) - 1))
+
+    def _take(self, kept: np.ndarray) -> None:
+        """Keep these kernels (N,), numbers that may repeat."""
         self._points.take(kept)
         self._evidence = self._evidence[kept]
+        self._past = {v: drawn[kept] for v, drawn in self._past.items()}
+        self.graph.factors = [f.taken(kept) for f in self.graph.factors]
+
+    # -- forgetting
+
+    def _forget(self, lag: int) -> None:
+        """Marginalize all but the newest poses, each kernel's about the mode given its beacons."""
+        old = [v for v in self.graph.kinds if v not in self._given][:-lag]
+        if not old:
+            return
+        self._past |= self.beliefs(old)
+        self._settle()
+        while old:
+            gone, old = old[:AT_ONCE], old[AT_ONCE:]
+            told = [i for i, f in enumerate(self.graph.factors) if set(gone) & set(f.variables)]
+            named = {v for i in told for v in self.graph.factors[i].variables}
+            labels = {v for v in named if self.graph.kinds[v] is LABEL}
+            rest = [v for v in self.graph.kinds if v in named and v not in labels and v not in gone]
+            _, message = Propagation().eliminate(
+                self.graph, gone, tuple(rest), told, [], self._points, frozenset(labels)
+            )
+            at = [self._points.values[v] for v in rest]
+            self.graph.forget([*gone, *labels], remembered(rest, at, message.Lam, message.eta))
+        self._given -= {v for v in self._given if v not in self.graph.kinds}
+        for v in self._points.values.keys() - self.graph.kinds.keys():
+            self._points.drop(v)
+        self._propagation = Propagation()
+        self._grow(order(list(self.graph.kinds), [f.variables for f in self.graph.factors], self._last({})))
 
     # -- moves
 

@@ -51,6 +51,10 @@ class Factor:
         """Log density (...,) with which `sample` draws variable `towards`, where that is not this factor's own."""
         return None
 
+    def taken(self, kept: np.ndarray) -> Factor:
+        """This factor for the kernels (N,) that are kept, numbers that may repeat; most are the same for all."""
+        return self
+
     def linearize(self, *values: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """Residual (..., k) and its Jacobians [(..., k, d)], by central differences unless a subclass knows them."""
         e = self.residual(*values)
