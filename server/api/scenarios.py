@@ -6,11 +6,13 @@ import json
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from engine.scenario import toml
+from engine.scenario.families import MODELS
 from engine.scenario.models import ScenarioBase
-from server.inline import from_json
+from server.inline import from_json, with_values
 from server.problems import Refusal
 from server.site import Here
 
@@ -27,6 +29,28 @@ def scenarios(here: Here) -> list[dict[str, Any]]:
 def scenario(name: str, here: Here) -> dict[str, Any]:
     """A scenario as JSON and as the TOML of its file."""
     return _shown(name, here.shelf.find(name), here)
+
+
+class Edits(BaseModel):
+    """What to change in a scenario."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    set: dict[str, Any] = Field({}, max_length=200, description="key paths and their values, as in network.loss: 0.4")
+
+
+@router.post("/scenarios/{name}/edited")
+def edited(name: str, body: Edits, here: Here) -> dict[str, Any]:
+    """A scenario with some keys changed, as JSON and TOML; nothing is kept."""
+    return _shown(name, with_values(here.shelf.find(name), body.set), here)
+
+
+@router.get("/schemas/{family}")
+def schema(family: str) -> dict[str, Any]:
+    """The JSON schema of a family's scenarios: keys, bounds, defaults, and what each means."""
+    if family not in MODELS:
+        raise Refusal(404, "unknown-family", f"there is no family {family[:80]!r}; there are {', '.join(MODELS)}")
+    return MODELS[family].model_json_schema()
 
 
 @router.put(

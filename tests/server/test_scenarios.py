@@ -29,6 +29,23 @@ def test_a_saved_scenario_comes_back_runs_and_goes(live: Live):
     assert live.http.delete("/api/scenarios/mine").status_code == 404
 
 
+def test_an_edited_scenario_comes_as_json_and_toml_and_is_not_kept(live: Live):
+    edits = {"set": {"network.loss": 0.5, "vehicles.scout.sensors.modem.range_sigma_m": 2.0}}
+    edited = live.http.post("/api/scenarios/first-look/edited", json=edits).json()
+    assert edited["scenario"]["network"]["loss"] == 0.5 and "loss = 0.5" in edited["toml"]
+    assert edited["scenario"]["vehicles"][0]["sensors"]["modem"]["range_sigma_m"] == 2.0
+    assert live.http.get("/api/scenarios/first-look").json()["scenario"]["network"]["loss"] == 0.2
+    wrong = live.http.post("/api/scenarios/first-look/edited", json={"set": {"network.loss": 7}})
+    assert wrong.status_code == 422 and wrong.json()["errors"][0]["key"] == "network.loss"
+
+
+def test_every_family_tells_its_schema(live: Live):
+    for family in {e["family"] for e in live.http.get("/api/scenarios").json()}:
+        schema = live.http.get(f"/api/schemas/{family}").json()
+        assert {"title", "seed", "trials", "duration_s"} <= set(schema["properties"])
+    assert live.http.get("/api/schemas/nosuch").status_code == 404
+
+
 def test_shipped_scenarios_stay(live: Live):
     assert live.http.delete("/api/scenarios/first-look").status_code == 403
     assert live.http.get("/api/scenarios/first-look").status_code == 200
