@@ -386,7 +386,8 @@ class Jobs:
         outline = self.outline(job.id) or work.outline(scenario)
         artifacts.write_text(folder / VIEW, dumps(view.build(outline, parts, job.algorithms)))
         artifacts.write_result(folder, result)
-        artifacts.write_sums(folder, FILES)
+        graphs = [artifacts.graph_file(name) for name, tracks in result.tracks.items() if tracks.graph]
+        artifacts.write_sums(folder, [*FILES, *graphs])
         notes = [f"{name}: {note}" for name, tracks in result.tracks.items() for note in tracks.notes]
         return [_loss(entry) for entry in lost] + notes
 

@@ -125,11 +125,11 @@ def arrays(id: str, here: Here) -> FileResponse:
 @router.get("/jobs/{id}/graphs/{algorithm}", response_class=FileResponse)
 def graphs(id: str, algorithm: str, here: Here) -> FileResponse:
     """Factor graphs and broadcasts of a finished job's first trial, of an algorithm whose view says it has them."""
-    found = here.jobs.find(id)
-    path = here.jobs.artifact(id, artifacts.graph_file(algorithm)) if algorithm in found.algorithms else None
-    if path is None or not path.is_file():
+    written = artifacts.read_sums(here.jobs.artifact(id, artifacts.RESULT).parent)
+    name = artifacts.graph_file(algorithm)
+    if name not in written:
         raise Refusal(404, "no-graph", f"{algorithm!r} tells of no factor graph in this job")
-    return FileResponse(path, media_type="application/json")
+    return FileResponse(here.jobs.artifact(id, name), media_type="application/json")
 
 
 @router.get("/jobs/{id}/report", response_class=HTMLResponse)
