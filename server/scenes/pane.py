@@ -26,13 +26,15 @@ FIELD_OF_VIEW = np.radians(50.0)
 
 @dataclass(frozen=True)
 class Options:
-    """What to show: estimated trails, ranging rays, past ellipses; a vehicle to follow; the view from above."""
+    """What to show: estimated trails, ranging rays, past ellipses; a vehicle to follow; the view from above;
+    and vehicles to leave out."""
 
     trails: bool = True
     rays: bool = True
     ellipses: bool = True
     follow: str | None = None
     top: bool = False
+    hidden: tuple[str, ...] = ()
 
 
 class Pane:
@@ -45,6 +47,8 @@ class Pane:
         self._lock = threading.Lock()
         self.footage: Footage
         self._chart: Chart
+        self._truth: dict[str, np.ndarray] = {}
+        self._without: tuple[str, ...] | None = None
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         scene = self.server.scene
         scene.configure_environment_map(hdri=None)
@@ -81,12 +85,12 @@ class Pane:
                 section_color=palette.GRID_SECTION,
                 shadow_opacity=0.0,
             )
-            truth = [
-                dashes(chart.place(track[thinned(len(track), TRUTH_POINTS)], self._depth(subject)))
+            self._without = None
+            self._truth = {
+                subject: dashes(chart.place(track[thinned(len(track), TRUTH_POINTS)], self._depth(subject)))
                 for subject, track in footage.truth.items()
                 if self._moves(subject)
-            ]
-            self._lines("/truth", truth, [palette.TRUTH] * len(truth), 1.5)
+            }
             for n, subject in enumerate(footage.subjects):
                 self._vehicle(n, subject)
 
@@ -116,9 +120,14 @@ class Pane:
     def show(self, algorithm: str, moment_s: float, options: Options) -> None:
         """Draw one algorithm's estimates as they are at a moment of the mission."""
         footage, track = self.footage, self.footage.tracks[algorithm]
-        now: dict[str, np.ndarray] = {s: at(track.time_s, mean, moment_s) for s, mean in track.mean.items()}
-        truth = {s: at(footage.time_s, p, moment_s) for s, p in footage.truth.items()}
+        without = options.hidden
+        now = {s: at(track.time_s, mean, moment_s) for s, mean in track.mean.items() if s not in without}
+        truth = {s: at(footage.time_s, p, moment_s) for s, p in footage.truth.items() if s not in without}
         with self._lock, self.server.atomic():
+            if self._without != without:
+                self._without = without
+                lines = [line for subject, line in self._truth.items() if subject not in without]
+                self._lines("/truth", lines, [palette.TRUTH] * len(lines), 1.5)
             self._trails(algorithm, moment_s, now, options)
             self._present(algorithm, moment_s, now, truth)
             self._rays(moment_s, now, truth, options)
@@ -132,7 +141,7 @@ class Pane:
         past = int(np.searchsorted(track.time_s, moment_s, side="right"))
         shown, ringed = thinned(horizon, TRACK_POINTS), thinned(horizon, ELLIPSES)
         for n, name in enumerate(footage.names):
-            if name not in track.mean or not self._moves(name):
+            if name not in now or not self._moves(name):
                 continue
             depth, mean = self._depth(name), track.mean[name]
             line = np.concatenate([mean[shown[shown < past]], now[name][None]])
@@ -173,6 +182,8 @@ class Pane:
         recent = [p for p in footage.packets if p.tol_s <= moment_s <= p.toa_s + last][-RAYS:] if options.rays else []
         lines, colours = [], []
         for packet in recent:
+            if {names[packet.sender], names[packet.receiver]} & set(options.hidden):
+                continue
             ends = [
                 truth.get(names[v], now.get(names[v], np.full(2, np.nan))) for v in (packet.sender, packet.receiver)
             ]

@@ -147,6 +147,11 @@ class Session:
         for key, value in chosen.items():
             if key not in known:
                 raise ValueError(f"there is no option {key[:40]!r}; there are {', '.join(known)}")
+            if key == "hidden":
+                if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+                    raise ValueError("option hidden: a list of names is expected")
+                chosen[key] = tuple(value)
+                continue
             right = isinstance(value, str | None) if key == "follow" else isinstance(value, bool)
             if not right:
                 raise ValueError(

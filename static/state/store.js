@@ -56,6 +56,8 @@ export const store = createStore({
   result: null,
   /** The subject that curves and readings are about. */
   vehicle: null,
+  /** Names of the estimators and vehicles that are hidden everywhere. */
+  hidden: { algorithms: new Set(), vehicles: new Set() },
   /** Earlier runs, newest first; null until they have come. And ids of those that are about to be deleted. */
   jobs: null,
   leaving: new Set(),

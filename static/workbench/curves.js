@@ -2,6 +2,7 @@
 
 import { metres, number } from "../look/format.js";
 import { indexAt, sigmaOf } from "../state/samples.js";
+import { shownAlgorithms } from "../state/shown.js";
 
 /** The named one of a subject's curves in a view. */
 const own = (key) => (algorithm, vehicle) => algorithm.subjects[vehicle]?.[key];
@@ -88,9 +89,9 @@ export const QUANTITIES = [
 
 /** Curves {algorithm: {time_s, value}} of a quantity and subject: of the view, else of the streamed estimates. */
 export function curvesOf({ read, live }, state) {
-  const { job, view, vehicle } = state;
+  const { view, vehicle } = state;
   const found = new Map();
-  for (const name of job?.algorithms ?? []) {
+  for (const name of shownAlgorithms(state)) {
     const told = view?.algorithms[name];
     const value = told && read(told, vehicle, view);
     const streamed = state.live?.algorithms[name];

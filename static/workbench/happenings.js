@@ -6,15 +6,16 @@ const FIX_GAP_S = 30;
 const ALWAYS = 0.8;
 
 /**
- * Events of a view sorted into lanes: {heard: [packet], lost: [packet], fixes: [{subject, from_s, to_s}]},
+ * Events of a view that concern none of the hidden vehicles, sorted into lanes: {heard: [packet], lost: [packet], fixes: [{subject, from_s, to_s}]},
  * and `moments`, the times worth stepping to in order, each {time_s, words}.
  */
-export function happenings(view) {
-  const packets = view.events.filter((e) => e.kind === "packet");
+export function happenings(view, hidden) {
+  const events = view.events.filter((e) => ![e.from, e.to, e.subject].some((name) => hidden.has(name)));
+  const packets = events.filter((e) => e.kind === "packet");
   const heard = packets.filter((p) => p.heard);
   const lost = packets.filter((p) => !p.heard);
   const length_s = (view.time_s.at(-1) ?? 0) - (view.time_s[0] ?? 0);
-  const fixes = runs(view.events.filter((e) => e.kind === "fix")).filter((f) => f.to_s - f.from_s < ALWAYS * length_s);
+  const fixes = runs(events.filter((e) => e.kind === "fix")).filter((f) => f.to_s - f.from_s < ALWAYS * length_s);
   const moments = [
     ...heard.map((p) => ({ time_s: p.toa_s, words: `${p.from} → ${p.to} heard` })),
     ...lost.map((p) => ({ time_s: p.tol_s, words: `${p.from} → ${p.to} lost` })),

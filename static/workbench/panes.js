@@ -37,7 +37,6 @@ export function mountPanes(keys) {
       // A frame that moves in the document loads again, so only what is out of place moves.
       if (grid.children[n] !== root) grid.insertBefore(root, grid.children[n] ?? null);
     });
-    grid.dataset.count = String(names.length);
     const left = (job?.algorithms.length ?? 0) - names.length;
     note.hidden = !job || (hasWebGL && left <= 0);
     note.textContent = hasWebGL
@@ -76,7 +75,13 @@ export function mountPanes(keys) {
     }
   }
 
+  function sift({ hidden }) {
+    for (const [name, pane] of panes) pane.root.hidden = hidden.algorithms.has(name);
+    grid.dataset.count = String([...panes.values()].filter((pane) => !pane.root.hidden).length);
+  }
+
   store.watch(["job"], ({ job }) => arrange(job));
+  store.watch(["job", "hidden"], sift);
   store.watch(["job", "algorithms", "result", "vehicle", "view", "live"], label);
   store.watch(["job", "view", "live"], unveil);
   clock.watch(read);

@@ -35,7 +35,7 @@ export function mountPlots() {
   const soon = () => {
     if (!timer) timer = setTimeout(draw, store.state.view ? 0 : Math.max(0, drawnAt + REDRAW_MS - performance.now()));
   };
-  store.watch(["job", "view", "live", "vehicle", "algorithms"], soon);
+  store.watch(["job", "view", "live", "vehicle", "algorithms", "hidden"], soon);
   logarithmic.addEventListener("change", soon);
   darkScheme.addEventListener("change", soon);
   clock.watch(() => plots.forEach(point));

@@ -55,7 +55,7 @@ export function mountTable() {
   const choose = ({ vehicle }) => {
     for (const row of room.querySelectorAll("tr[data-subject]")) row.classList.toggle("chosen", row.dataset.subject === vehicle);
   };
-  store.watch(["job", "result", "algorithms", "view"], draw);
+  store.watch(["job", "result", "algorithms", "view", "hidden"], draw);
   store.watch(["vehicle"], choose);
   darkScheme.addEventListener("change", () => draw(store.state));
 }
@@ -76,13 +76,15 @@ function table(result, algorithms, view) {
     {},
     el("caption", { class: "unseen" }, "Every estimator and vehicle of this run"),
     el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Estimator"), el("th", { scope: "col" }, "Vehicle"), SUBJECT.map(head), WHOLE.map(head))),
-    Object.entries(result.algorithms).map(([name, answer]) => body(name, answer, algorithms, order, result)),
+    Object.entries(result.algorithms)
+      .filter(([name]) => !store.state.hidden.algorithms.has(name))
+      .map(([name, answer]) => body(name, answer, algorithms, order, result)),
   );
 }
 
 function body(name, answer, algorithms, order, result) {
   const known = algorithms.find((a) => a.name === name);
-  const subjects = Object.entries(answer.subjects).sort((a, b) => order.indexOf(a[0]) - order.indexOf(b[0]));
+  const subjects = Object.entries(answer.subjects).filter(([subject]) => !store.state.hidden.vehicles.has(subject)).sort((a, b) => order.indexOf(a[0]) - order.indexOf(b[0]));
   const span = { rowspan: Math.max(1, subjects.length) };
   return el(
     "tbody",

@@ -7,6 +7,7 @@ import { SPEEDS, clock } from "../state/clock.js";
 import { indexAt } from "../state/samples.js";
 import { store } from "../state/store.js";
 import { happenings } from "./happenings.js";
+import { buildLegend } from "./legend.js";
 
 const NOTHING = { heard: [], lost: [], fixes: [], moments: [] };
 /** Height of a lane of marks, px; the lanes lie under the slider, inset by half its thumb. */
@@ -52,6 +53,7 @@ export function mountTimeline() {
   part("timeline").append(
     el("div", { class: "controls" }, play, back, forth, speed, el("span", { class: "times" }, now, end), words, key),
     track,
+    buildLegend(),
   );
 
   const tick = () => {
@@ -77,8 +79,8 @@ export function mountTimeline() {
   tick();
 
   const draw = () => paint(lanes, events);
-  store.watch(["view"], ({ view }) => {
-    events = view ? happenings(view) : NOTHING;
+  store.watch(["view", "hidden"], ({ view, hidden }) => {
+    events = view ? happenings(view, hidden.vehicles) : NOTHING;
     key.replaceChildren(
       mark("heard", `${count(events.heard.length)} heard`),
       mark("lost", `${count(events.lost.length)} lost`),

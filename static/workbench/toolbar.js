@@ -18,7 +18,8 @@ export function mountToolbar(session) {
   const boxes = {};
   const tell = () => {
     const chosen = Object.fromEntries(Object.entries(boxes).map(([name, box]) => [name, box.checked]));
-    session.options({ ...chosen, follow: chosen.follow ? store.state.vehicle : null });
+    const hidden = [...store.state.hidden.vehicles];
+    session.options({ ...chosen, hidden, follow: chosen.follow ? store.state.vehicle : null });
   };
   const toggles = Object.entries(OPTIONS).map(([name, { label, on, hint }]) => {
     boxes[name] = el("input", { type: "checkbox", name: `pane-${name}`, checked: on, onchange: tell });
@@ -37,6 +38,7 @@ export function mountToolbar(session) {
     }
     for (const input of vehicles.querySelectorAll("input")) input.checked = input.value === vehicle;
   });
+  store.watch(["hidden"], tell);
   store.watch(["vehicle"], () => boxes.follow.checked && tell());
 }
 
