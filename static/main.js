@@ -17,6 +17,7 @@ import { pickAgain, readLibrary } from "./state/library.js";
 import { mountLink } from "./state/link.js";
 import { store } from "./state/store.js";
 import { mountStudies } from "./studies/studies.js";
+import { isTrial } from "./state/whatif.js";
 import { mountTabs } from "./tabs.js";
 import { mountExplorer } from "./tracking/explorer.js";
 import { SceneSession } from "./wire/scenes.js";
@@ -28,6 +29,7 @@ import { mountTable } from "./workbench/table.js";
 import { mountTimeline } from "./workbench/timeline.js";
 import { mountToolbar } from "./workbench/toolbar.js";
 
+import { mountWhatIf } from "./whatif/panel.js";
 mountRooms();
 mountSide();
 mountTabs();
@@ -36,6 +38,7 @@ mountMissions();
 mountAlgorithms();
 mountLaunch();
 mountPreview();
+mountWhatIf();
 mountExplorer();
 mountStudies();
 mountHeadline();
@@ -67,7 +70,7 @@ let picked = null;
 store.watch(["job", "missions"], ({ job, missions }) => {
   if (!job || missions === null || job.id === picked) return;
   picked = job.id;
-  pickAgain(job);
+  if (!isTrial(job.id)) pickAgain(job);
 });
 clock.watch(() => {
   if (shown !== null && clock.end > clock.start && !clock.following) session.seek(clock.time);

@@ -1,9 +1,9 @@
-// The two tabs of the side column, as the ARIA pattern has them.
+// The tabs of the side column, as the ARIA pattern has them.
 
 import { part } from "./look/dom.js";
 
 export function mountTabs() {
-  const tabs = [part("tab-new"), part("tab-runs")];
+  const tabs = [part("tab-new"), part("tab-whatif"), part("tab-runs")];
   const choose = (chosen, focus) => {
     for (const tab of tabs) {
       const selected = tab === chosen;
@@ -16,9 +16,10 @@ export function mountTabs() {
   tabs.forEach((tab, n) => {
     tab.addEventListener("click", () => choose(tab, false));
     tab.addEventListener("keydown", (event) => {
-      if (event.key === "ArrowRight" || event.key === "ArrowLeft") {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (step) {
         event.preventDefault();
-        choose(tabs[1 - n], true);
+        choose(tabs[(n + step + tabs.length) % tabs.length], true);
       }
     });
   });

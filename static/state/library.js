@@ -23,6 +23,12 @@ export async function readLibrary() {
   }
 }
 
+/** Reads the missions again, and their scenarios when they are asked for next. */
+export async function readMissions() {
+  scenarios.clear();
+  store.set({ missions: await persist(api.scenarios) });
+}
+
 /** A mission's scenario, read once; null where it cannot be read. */
 export function scenarioOf(name) {
   if (!scenarios.has(name)) {

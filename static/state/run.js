@@ -47,6 +47,18 @@ export function closeRun() {
   clock.reset(0, 0);
 }
 
+/** Shows another run that is done in the place of the one that is open, at the same time and vehicle; that one's id. */
+export function replaceRun(job, view, result) {
+  open.abort();
+  open = new AbortController();
+  const { run } = store.state;
+  const fresh = clock.end <= clock.start;
+  store.set({ room: "workbench", run: job.id, job, result, progress: null, live: null, notices: [] });
+  take(view);
+  if (fresh) clock.reset(clock.start, clock.end, clock.end);
+  return run;
+}
+
 /** Submits a run and opens it; a refusal is kept for the form. */
 export async function startRun(body) {
   store.set({ refusal: null });

@@ -28,14 +28,15 @@ export async function problemOf(response) {
   return new Problem({ ...known, status: response.status, errors: Array.isArray(known.errors) ? known.errors : [] });
 }
 
-async function request(path, { method = "GET", body, headers = {}, signal } = {}) {
+/** `body` goes as JSON, `raw` as it is, of a media type. */
+async function request(path, { method = "GET", body, raw, type = "application/json", headers = {}, signal } = {}) {
   let response;
   try {
     response = await fetch(path, {
       method,
       signal,
-      headers: body === undefined ? headers : { "content-type": "application/json", ...headers },
-      body: body === undefined ? undefined : JSON.stringify(body),
+      headers: body === undefined && raw === undefined ? headers : { "content-type": type, ...headers },
+      body: body === undefined ? raw : JSON.stringify(body),
     });
   } catch (error) {
     if (error.name === "AbortError") throw error;
@@ -51,6 +52,10 @@ export const health = (signal) => request("/api/health", { signal });
 export const algorithms = () => request("/api/algorithms");
 export const scenarios = () => request("/api/scenarios");
 export const scenario = (name, signal) => request(`/api/scenarios/${encodeURIComponent(name)}`, { signal });
+export const schema = (family) => request(`/api/schemas/${encodeURIComponent(family)}`);
+export const edited = (name, set, signal) => request(`/api/scenarios/${encodeURIComponent(name)}/edited`, { method: "POST", body: { set }, signal });
+export const saveScenario = (name, scenario) => request(`/api/scenarios/${encodeURIComponent(name)}`, { method: "PUT", body: scenario });
+export const importToml = (name, text) => request(`/api/scenarios/${encodeURIComponent(name)}`, { method: "PUT", raw: text, type: "application/toml" });
 export const jobs = () => request("/api/jobs");
 export const findJob = (id, signal) => request(job(id), { signal });
 export const view = (id, signal) => request(`${job(id)}/view`, { signal });
