@@ -22,6 +22,9 @@ from engine.navigation.ranging import Innovation, horizontal_range
 from engine.registry import Progress
 from engine.tracks import Belief, Innovations, PacketCount, Series, Tracks
 
+#: The curve of what all vehicles together have broadcast so far.
+SENT = "sent_bytes"
+
 
 @dataclass(frozen=True)
 class Member:
@@ -122,6 +125,7 @@ def run_nodes(
     """
     nodes: list[Node] = [make(member) for member in members(mission)]
     counts: list[PacketCount] = []
+    said = np.zeros(mission.trials)
     in_flight: dict[int, np.ndarray] = {}
 
     def launch(event: Launch) -> None:
@@ -129,6 +133,7 @@ def run_nodes(
         if packet is not None:
             sent, size = packet.data.shape
             counts.append(PacketCount(sent, 0, sent * size, sent * packet.floats, size))
+            said[:] += size
             in_flight[event.index] = packet.data
 
     def receive(event: Arrival) -> Innovation | None:
@@ -142,7 +147,8 @@ def run_nodes(
         return nodes[event.vehicle].receive(event, np.where(heard[:, None], data, 0).astype(np.uint8))
 
     def curves() -> dict[str, np.ndarray]:
-        return {k: v for node in nodes for k, v in monitor(node).items()} if monitor else {}
+        own = {k: v for node in nodes for k, v in monitor(node).items()} if monitor else {}
+        return own | {SENT: said}
 
     recorder = _Recorder(mission, progress)
     recorder.drive(
@@ -248,7 +254,9 @@ class _Recorder:
 
 
 def _series(name: str, value: np.ndarray) -> Series:
-    """A curve named "what/subject" or "what/subject~subject"; all of them are coefficients so far."""
+    """A curve by its name: SENT, or a coefficient, "what/subject" or "what/subject~subject"."""
+    if name == SENT:
+        return Series("Bytes broadcast by all so far", "B", value)
     what, _, whom = name.partition("/")
     subjects = tuple(whom.split("~"))
     title = f"{what.replace('_', ' ').capitalize()} of {' and '.join(subjects)}"
