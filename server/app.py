@@ -12,12 +12,13 @@ from fastapi import FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 
 from server import problems, recovery
-from server.api import algorithms, docs, health, jobs, marks, page, scenarios, scenes, tables, tracking
+from server.api import algorithms, docs, health, jobs, logs, marks, page, scenarios, scenes, tables, tracking
 from server.cluster import Cluster
 from server.guard import Guard
 from server.jobs import Jobs
 from server.journal import Journal
 from server.meter import Meter, Tally
+from server.logbook import Logbook
 from server.scenes.sessions import Sessions
 from server.settings import Settings
 from server.shelf import Shelf
@@ -41,7 +42,7 @@ def create_app(settings: Settings) -> FastAPI:
         work = Jobs(store, journal, cluster, settings)
         scenes = Sessions(settings, work)
         shelf = Shelf(settings.data / "scenarios")
-        app.state.site = Site(settings, journal, cluster, work, shelf, scenes, tally)
+        app.state.site = Site(settings, journal, cluster, work, shelf, Logbook(settings, shelf), scenes, tally)
         starting = asyncio.create_task(cluster.start(work.hear))
         work.start()
         try:
@@ -68,7 +69,7 @@ def create_app(settings: Settings) -> FastAPI:
         default_response_class=Json,
     )
     problems.install(app)
-    for room in (health, algorithms, scenarios, jobs, marks, tables, tracking, scenes, docs, page):
+    for room in (health, algorithms, scenarios, logs, jobs, marks, tables, tracking, scenes, docs, page):
         app.include_router(room.router, responses=problems.ANSWERS)
     app.add_middleware(GZipMiddleware, minimum_size=2000, compresslevel=5)
     app.add_middleware(Guard, settings=settings)

@@ -76,7 +76,7 @@ class Guard:
             return
         answer = _with_headers(send)
         if refusal is None:
-            body = await self._body(headers, receive)
+            body = await self._body(scope, headers, receive)
             if isinstance(body, bytes):
                 await self.app(scope, _replay(body, receive), answer)
                 return
@@ -144,13 +144,18 @@ class Guard:
         answer.set_cookie(self.cookie, self._pass, httponly=True, samesite="strict", secure=secure, path="/")
         return answer
 
-    async def _body(self, headers: Headers, receive: Receive) -> bytes | Refusal:
+    def _largest(self, scope: Scope) -> int:
+        """Bytes that a request's body may have: a file of a recorded log more than others."""
+        uploads = scope["method"] == "PUT" and scope["path"].startswith("/api/logs/")
+        return self.settings.largest_log_file if uploads else self.settings.largest_body
+
+    async def _body(self, scope: Scope, headers: Headers, receive: Receive) -> bytes | Refusal:
         """The whole body, or the refusal of one too large or too slow; no request here needs to be streamed in.
 
         What is too large is still taken in for a while and thrown away: a client that is busy sending would
         not hear the answer.
         """
-        limit = self.settings.largest_body
+        limit = self._largest(scope)
         length = headers.get("content-length", "0")
         declared = int(length) if length.isascii() and length.isdigit() and len(length) < 20 else limit + 1
         parts: list[bytes] = []

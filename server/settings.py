@@ -23,8 +23,9 @@ class Settings:
     tls:// address. workers counts the processes of our own cluster, worker_memory (bytes; None: their share of the
     machine's) is what one of them may use. most_work is trials x vehicles x mission seconds x algorithms of one job;
     jobs that ended keep_days ago, and the oldest while all take more than keep_bytes, are deleted unless pinned;
-    least_free_disk (bytes) stays free on the disk of the data folder. slowest_head_s and slowest_body_s are how long
-    the head and the body of a request may take to arrive.
+    least_free_disk (bytes) stays free on the disk of the data folder; of uploaded logs one file may have
+    largest_log_file bytes, all together largest_logs. slowest_head_s and slowest_body_s are how long the head and the
+    body of a request may take to arrive.
     """
 
     data: Path
@@ -38,6 +39,8 @@ class Settings:
     workers: int = max(os.cpu_count() or 1, 2)
     worker_memory: int | None = None
     largest_body: int = 2 * 1024 * 1024
+    largest_log_file: int = 64 * 1024 * 1024
+    largest_logs: int = 2 * 1024**3
     slowest_head_s: float = 20.0
     slowest_body_s: float = 60.0
     most_trials: int = 100_000

@@ -11,6 +11,7 @@ from starlette.requests import HTTPConnection
 from server.cluster import Cluster
 from server.jobs import Jobs
 from server.journal import Journal
+from server.logbook import Logbook
 from server.meter import Tally
 from server.scenes.sessions import Sessions
 from server.settings import Settings
@@ -26,6 +27,7 @@ class Site:
     cluster: Cluster
     jobs: Jobs
     shelf: Shelf
+    logbook: Logbook
     scenes: Sessions
     tally: Tally
 
