@@ -8,6 +8,7 @@ import sqlite3
 from collections.abc import AsyncIterator
 from importlib.metadata import version
 
+import anyio.to_thread
 from fastapi import FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 
@@ -17,13 +18,16 @@ from server.cluster import Cluster
 from server.guard import Guard
 from server.jobs import Jobs
 from server.journal import Journal
-from server.meter import Meter, Tally
 from server.logbook import Logbook
+from server.meter import Meter, Tally
 from server.scenes.sessions import Sessions
 from server.settings import Settings
 from server.shelf import Shelf
 from server.site import Site
 from server.wire import Json
+
+#: Requests that are worked on at once in threads: more would only keep each other, and the event loop, waiting.
+MOST_THREADS = 8
 
 DESCRIPTION = """Compare cooperative underwater navigation estimators. Errors are problem+json
 (type, title, status, detail, and the key paths of input at fault)."""
@@ -35,6 +39,7 @@ def create_app(settings: Settings) -> FastAPI:
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        anyio.to_thread.current_default_thread_limiter().total_tokens = MOST_THREADS
         settings.data.mkdir(parents=True, exist_ok=True)
         store = recovery.open_store(settings.data)
         journal = Journal(store)

@@ -125,7 +125,7 @@ class Cluster:
         await self._client  # pyright: ignore[reportGeneralTypeIssues]
         self.client.subscribe_topic(self._topic, lambda event: hear(event[1]))
         self.client.subscribe_topic("all", lambda event: self._told(event[1]))
-        await self.client.register_plugin(work.Prepared())  # pyright: ignore
+        await self.client.register_plugin(work.Prepared(self._own is not None))  # pyright: ignore
         await self._look()
 
     async def _stay(self) -> None:

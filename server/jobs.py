@@ -141,40 +141,41 @@ class Jobs:
         if problems:
             raise ScenarioError(problems)
         self.admit(wanted.client)
-        await asyncio.to_thread(self._check_room, price)
-        job = Job(
-            id=secrets.token_hex(8),
-            state="queued",
-            title=scenario.title,
-            scenario=wanted.name,
-            family=scenario.family,
-            algorithms=names,
-            trials=scenario.trials,
-            seed=scenario.seed,
-            created_at=now(),
-            toml=toml.dumps(scenario),
-            origin=scenario.origin,
-            idempotency_key=wanted.key,
-            digest=digest,
-            client=wanted.client,
-            purpose="what-if" if wanted.purpose == "what-if" and price.worker_s <= WHAT_IF_S else "run",
-            limit_s=wanted.limit_s,
-            changes=wanted.body.get("set", {}),
-        )
-        self._clients[job.id] = job.client
-        folder = self._folder / job.id
+        id = secrets.token_hex(8)
+        self._clients[id] = wanted.client  # from here on it counts
+        folder = self._folder / id
         try:
+            await asyncio.to_thread(self._check_room, price)
+            job = Job(
+                id=id,
+                state="queued",
+                title=scenario.title,
+                scenario=wanted.name,
+                family=scenario.family,
+                algorithms=names,
+                trials=scenario.trials,
+                seed=scenario.seed,
+                created_at=now(),
+                toml=toml.dumps(scenario),
+                origin=scenario.origin,
+                idempotency_key=wanted.key,
+                digest=digest,
+                client=wanted.client,
+                purpose="what-if" if wanted.purpose == "what-if" and price.worker_s <= WHAT_IF_S else "run",
+                limit_s=wanted.limit_s,
+                changes=wanted.body.get("set", {}),
+            )
             await asyncio.to_thread(write_record, folder, job)
             kept, new = await asyncio.to_thread(self.store.add, job)
             if not new:
                 return _same(kept, digest)
-            logs.job.set(job.id)
-            log.info("job %s is accepted", job.id)
+            logs.job.set(id)
+            log.info("job %s is accepted", id)
             self._begin(kept)
             return kept
         finally:
-            if job.id not in self._tasks:
-                del self._clients[job.id]
+            if id not in self._tasks:
+                del self._clients[id]
                 await asyncio.to_thread(shutil.rmtree, folder, True)
 
     def _check_room(self, price: cost.Cost) -> None:
@@ -334,8 +335,7 @@ class Jobs:
     async def _compute(self, job: Job) -> None:
         folder = self._folder / job.id
         await asyncio.to_thread(folder.mkdir, parents=True, exist_ok=True)
-        scenario = toml.loads(job.toml, origin=job.origin)
-        shards = runner.shards(scenario, job.algorithms)
+        scenario, shards = await asyncio.to_thread(_planned, job)
         await asyncio.to_thread(self._check_shards, job.id)
         finished = {*self.store.shards(job.id), *self.store.lost(job.id)}
         watch = self._running[job.id] = Watch(job, len(shards), finished, self.journal, folder / OUTLINE)
@@ -402,6 +402,11 @@ class Jobs:
     def _drop_shards(self, id: str) -> None:
         for path in (self._folder / id).glob("shard-*.npz"):
             path.unlink(missing_ok=True)
+
+
+def _planned(job: Job) -> tuple[ScenarioBase, list[runner.Shard]]:
+    scenario = toml.loads(job.toml, origin=job.origin)
+    return scenario, runner.shards(scenario, job.algorithms)
 
 
 async def _to_the_end(function: Callable[..., T], *arguments: Any) -> T:

@@ -21,6 +21,8 @@ from server.settings import Settings
 #: Where a token may be given that lasts longer than one run.
 TOKEN_VARIABLE = "COOPNAV_TOKEN"
 SHORTEST_TOKEN = 16
+#: A thread that computes hands over to the one that answers so soon, s.
+SWITCH_S = 0.001
 #: Connections at once; more are answered 503.
 MOST_CONNECTIONS = 1000
 
@@ -92,6 +94,7 @@ def serve(settings: Settings, log_format: str = "text", log_level: str = "warnin
     listener = listen(settings)
     settings = replace(settings, port=listener.getsockname()[1])
     logs.write(log_format, log_level)
+    sys.setswitchinterval(SWITCH_S)
     print(f"coopnav is open at {address(settings, shown=not given)}", flush=True)
     print(f"jobs and scenarios are kept in {settings.data}; Ctrl-C ends the server", file=sys.stderr, flush=True)
     config = configured(create_app(settings), settings)

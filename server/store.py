@@ -121,15 +121,15 @@ class Store:
     """The database in a file; safe to use from any thread."""
 
     def __init__(self, path: Path) -> None:
-        self._lock = threading.RLock()
-        self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
-        self._db.row_factory = sqlite3.Row
+        self._lock, self._read_lock = threading.RLock(), threading.RLock()
+        self._db, self._reader = _connect(path), _connect(path)
         try:
             for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
                 self._db.execute(f"PRAGMA {pragma}")
             self._migrate(path)
+            self._reader.execute("PRAGMA query_only=ON")
         except BaseException:
-            self._db.close()
+            self.close()
             raise
 
     def _migrate(self, path: Path) -> None:
@@ -144,7 +144,8 @@ class Store:
                 db.execute(f"PRAGMA user_version={version + 1}")
 
     def close(self) -> None:
-        with self._lock:
+        with self._lock, self._read_lock:
+            self._reader.close()
             self._db.close()
 
     def consistent(self) -> bool:
@@ -155,13 +156,19 @@ class Store:
 
     def noted(self, key: str) -> str | None:
         """What was noted of the store itself."""
-        with self._lock:
-            row = self._db.execute("SELECT value FROM notes WHERE key=?", (key,)).fetchone()
+        with self._reading() as db:
+            row = db.execute("SELECT value FROM notes WHERE key=?", (key,)).fetchone()
         return row["value"] if row is not None else None
 
     def note(self, key: str, value: str) -> None:
         with self._transaction() as db:
             db.execute("INSERT OR REPLACE INTO notes VALUES (?,?)", (key, value))
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        """For a statement that sees what was committed, without waiting for the disk to take what is being written."""
+        with self._read_lock:
+            yield self._reader
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
@@ -189,38 +196,38 @@ class Store:
         return job, True
 
     def job(self, id: str) -> Job | None:
-        with self._lock:
-            row = self._db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone()
+        with self._reading() as db:
+            row = db.execute("SELECT * FROM jobs WHERE id=?", (id,)).fetchone()
         return _job(row) if row is not None else None
 
     def keyed(self, key: str) -> Job | None:
         """The job accepted under an idempotency key."""
-        with self._lock:
-            row = self._db.execute("SELECT * FROM jobs WHERE idempotency_key=?", (key,)).fetchone()
+        with self._reading() as db:
+            row = db.execute("SELECT * FROM jobs WHERE idempotency_key=?", (key,)).fetchone()
         return _job(row) if row is not None else None
 
     def jobs(self, limit: int = 200) -> list[Job]:
         """The newest jobs first."""
-        with self._lock:
-            rows = self._db.execute("SELECT * FROM jobs ORDER BY rowid DESC LIMIT ?", (limit,)).fetchall()
+        with self._reading() as db:
+            rows = db.execute("SELECT * FROM jobs ORDER BY rowid DESC LIMIT ?", (limit,)).fetchall()
         return [_job(row) for row in rows]
 
     def counts(self) -> dict[str, int]:
         """How many jobs there are in each state."""
-        with self._lock:
-            rows = self._db.execute("SELECT state, count(*) AS n FROM jobs GROUP BY state").fetchall()
+        with self._reading() as db:
+            rows = db.execute("SELECT state, count(*) AS n FROM jobs GROUP BY state").fetchall()
         return {row["state"]: row["n"] for row in rows}
 
     def unfinished(self) -> list[Job]:
         """Accepted jobs without an end, oldest first."""
-        with self._lock:
-            rows = self._db.execute("SELECT * FROM jobs WHERE state IN ('queued','running') ORDER BY rowid").fetchall()
+        with self._reading() as db:
+            rows = db.execute("SELECT * FROM jobs WHERE state IN ('queued','running') ORDER BY rowid").fetchall()
         return [_job(row) for row in rows]
 
     def ended(self) -> list[Job]:
         """Jobs with an end, oldest first."""
-        with self._lock:
-            rows = self._db.execute(f"SELECT * FROM jobs WHERE state IN ({_FINAL}) ORDER BY rowid").fetchall()
+        with self._reading() as db:
+            rows = db.execute(f"SELECT * FROM jobs WHERE state IN ({_FINAL}) ORDER BY rowid").fetchall()
         return [_job(row) for row in rows]
 
     def run_again(self, id: str) -> None:
@@ -286,16 +293,16 @@ class Store:
 
     def shards(self, id: str) -> dict[int, str]:
         """Shards whose files are complete, by number in order, with the files' checksums."""
-        with self._lock:
-            rows = self._db.execute(
+        with self._reading() as db:
+            rows = db.execute(
                 "SELECT number, sha256 FROM shards WHERE job=? AND lost IS NULL ORDER BY number", (id,)
             ).fetchall()
         return {row["number"]: row["sha256"] for row in rows}
 
     def lost(self, id: str) -> dict[int, dict[str, Any]]:
         """Shards that were given up, by number in order, with what is known of each."""
-        with self._lock:
-            rows = self._db.execute(
+        with self._reading() as db:
+            rows = db.execute(
                 "SELECT number, lost FROM shards WHERE job=? AND lost IS NOT NULL ORDER BY number", (id,)
             ).fetchall()
         return {row["number"]: json.loads(row["lost"]) for row in rows}
@@ -311,8 +318,8 @@ class Store:
 
     def rates(self, family: str) -> dict[str, float]:
         """Worker seconds that a unit of work costs in a family, by algorithm, as far as it has been seen."""
-        with self._lock:
-            rows = self._db.execute("SELECT * FROM rates WHERE family=?", (family,)).fetchall()
+        with self._reading() as db:
+            rows = db.execute("SELECT * FROM rates WHERE family=?", (family,)).fetchall()
         return {row["algorithm"]: row["seconds"] / row["work"] for row in rows if row["work"] > 0}
 
     def append(self, events: Iterable[tuple[str, str, str]]) -> None:
@@ -325,11 +332,17 @@ class Store:
 
     def events(self, id: str, after: int = 0, limit: int = 100) -> list[Event]:
         """The next events of a job after an event id."""
-        with self._lock:
-            rows = self._db.execute(
+        with self._reading() as db:
+            rows = db.execute(
                 "SELECT id, kind, data FROM events WHERE job=? AND id>? ORDER BY id LIMIT ?", (id, after, limit)
             ).fetchall()
         return [Event(row["id"], row["kind"], row["data"]) for row in rows]
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+    db.row_factory = sqlite3.Row
+    return db
 
 
 def _append(db: sqlite3.Connection, job: str, kind: str, data: str) -> None:

@@ -39,13 +39,25 @@ class Stopped(Exception):
     """The job of the shard that is running has ended."""
 
 
+#: Workers on the server's own machine leave the processor to the server when it wants it.
+NICENESS = 5
+
+
 class Prepared(WorkerPlugin):
-    """Makes a worker ready before its first shard: the engine imported, Ctrl-C left to the server."""
+    """Makes a worker ready before its first shard: the engine imported, Ctrl-C left to the server.
+
+    One that shares the server's machine steps back behind it.
+    """
 
     name = "coopnav"
     idempotent = True
 
+    def __init__(self, shares_machine: bool) -> None:
+        self.shares_machine = shares_machine
+
     def setup(self, worker: Any) -> None:
+        if self.shares_machine and hasattr(os, "nice"):
+            os.nice(NICENESS - os.nice(0))
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         registry.families()
