@@ -1,6 +1,7 @@
 """Acoustic pursuit of a target (C19 chapter 3: Cheung): one file per way to share what was heard."""
 
 from engine.pursuit import centralized, decentralized
+from engine.pursuit.listening import FilterChoice, run_filter, run_multilateration
 from engine.pursuit.mission import fly, outline
 from engine.pursuit.options import PursuitOptions
 from engine.registry import Algorithm, Family
@@ -36,5 +37,26 @@ REGISTERED = (
         run=centralized.run,
         assumes=("a shore station in reach of every vehicle", "one more slot in every cycle"),
         options=PursuitOptions,
+    ),
+    Algorithm(
+        name="multilateration",
+        title="Multilateration",
+        family="pursuit",
+        summary="Every ping by itself: least squares over the differences of its arrivals.",
+        source="Cheung 2019, section 3.1; Levenberg and Marquardt",
+        run=run_multilateration,
+        centralized=True,
+        assumes=("every arrival reaches one place at once", "moving receivers keep perfect formation"),
+    ),
+    Algorithm(
+        name="tdoa_filter",
+        title="TDOA filter",
+        family="pursuit",
+        summary="The sigma-point filter over all pings, with no channel in between.",
+        source="Cheung 2019, eq. 3.2-3.19",
+        run=run_filter,
+        centralized=True,
+        assumes=("every arrival reaches one place at once", "moving receivers keep perfect formation"),
+        options=FilterChoice,
     ),
 )

@@ -17,10 +17,20 @@ from engine.pursuit.sigma_points import Rule, spread
 
 @dataclass(frozen=True)
 class Surprise:
-    """Normalized innovation squared (...,) of an update and its degrees of freedom (...,), 0 where nothing came."""
+    """Innovations (..., r) of an update, whitened: independent standard normals if the filter is right, NaN where
+    nothing came."""
 
-    nis: np.ndarray
-    dof: np.ndarray
+    white: np.ndarray
+
+    @property
+    def dof(self) -> np.ndarray:
+        """Degrees of freedom (...,)."""
+        return np.isfinite(self.white).sum(axis=-1)
+
+    @property
+    def nis(self) -> np.ndarray:
+        """Normalized innovation squared (...,), 0 where nothing came."""
+        return np.nansum(self.white**2, axis=-1)
 
 
 def update(
@@ -57,8 +67,8 @@ def update(
         S = symmetric(H @ prior.cov @ transpose(H) + noise)
         K = transpose(np.linalg.solve(S, H @ prior.cov))
         if surprise is None:
-            nis = np.einsum("...i,...i->...", residual, np.linalg.solve(S, residual[..., None])[..., 0])
-            surprise = Surprise(nis, used.sum(axis=-1))
+            white = np.linalg.solve(np.linalg.cholesky(S), residual[..., None])[..., 0]
+            surprise = Surprise(np.where(used, white, np.nan))
         left = np.eye(prior.mean.shape[-1]) - K @ H
         posterior = Moments(
             prior.mean + apply(K, residual), symmetric(left @ prior.cov @ transpose(left) + K @ noise @ transpose(K))

@@ -73,17 +73,18 @@ def tracks(diary: Diary, water: Water, tracker: Tracker, packets: PacketCount, n
     path = water.path(mission.time_s)
     own = np.broadcast_to(GPS_SIGMA_M**2 * np.eye(2), (*path.shape[:1], path.shape[2], 2, 2))
     beliefs = {name: Belief(path[:, i], own.copy()) for i, name in enumerate(mission.names)}
-    series, innovations = {}, {}
+    series, heard = {}, {}
+    end_s = np.array([s.end_s for s in diary.slots])
     for i, (name, h) in enumerate(zip(mission.names, holders)):
         beliefs[subject(name)] = Belief(tracker.mean[:, h, :, :2].copy(), tracker.cov[:, h, :, :2, :2].copy())
         truth = mission.truth[subject(name)]
         away = np.linalg.norm(path[:, i] - truth - mission.offsets[i], axis=-1)
         series[f"formation_error_m/{name}"] = Series(f"Formation error of {name}", "m", away, (name,))
         for key, (title, value) in _figures(diary, int(h)).items():
-            unit = "m" if key.endswith("_m") else "s"
+            unit = {"m": "m", "s": "s"}.get(key.rpartition("_")[2], "1")
             series[f"{key}/{name}"] = Series(f"{title} of {name}", unit, value, (subject(name),))
-        innovations[subject(name)] = _innovations(diary, int(h))
-    return Tracks(beliefs=beliefs, packets=packets, innovations=innovations, series=series, notes=notes)
+        heard[subject(name)] = innovations(end_s, diary.surprises, int(h))
+    return Tracks(beliefs=beliefs, packets=packets, innovations=heard, series=series, notes=notes)
 
 
 def _figures(diary: Diary, h: int) -> dict[str, tuple[str, np.ndarray]]:
@@ -118,10 +119,14 @@ def _figures(diary: Diary, h: int) -> dict[str, tuple[str, np.ndarray]]:
     first = _first_of_cycle(diary, kind)
     found["first_delay_s"] = ("Time from the ping to the first update", placed(delay, first))
     trailing = np.stack([v[:, h] for v in diary.trailing_m], axis=1)
+    length = np.hypot(*diary.mission.offsets.T).mean()
     for word, low, high in (("early", 0.25, 0.5), ("late", 0.75, 1.0)):
         within = (end_s > low * duration) & (end_s <= high * duration)
         title = f"{word.capitalize()} in the mission: distance from the fix to where the target is by then"
         found[f"{word}_trailing_m"] = (title, placed(trailing, (kind != Update.NONE) & within))
+        near = (trailing < length).astype(float)
+        title = f"{word.capitalize()} in the mission: share of fixes within a formation length of where the target is"
+        found[f"{word}_kept"] = (title, placed(near, (kind != Update.NONE) & within))
     return found
 
 
@@ -136,12 +141,8 @@ def _first_of_cycle(diary: Diary, kind: np.ndarray) -> np.ndarray:
     return first
 
 
-def _innovations(diary: Diary, h: int) -> Innovations:
-    """Every update's innovation as one number: the root of its normalized square per degree of freedom."""
-    nis = np.stack([s.nis[:, h] for s in diary.surprises], axis=1)
-    dof = np.stack([s.dof[:, h] for s in diary.surprises], axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        value = np.where(dof > 0, np.sqrt(nis / dof), np.nan)
-    return Innovations(
-        np.array([s.end_s for s in diary.slots]), value, np.where(dof > 0, 1.0, np.nan), np.ones(value.shape, bool)
-    )
+def innovations(moments_s: np.ndarray, surprises: list[Surprise], h: int) -> Innovations:
+    """One holder's whitened innovations, those of one update side by side; they have variance one."""
+    value = np.concatenate([s.white[:, h] for s in surprises], axis=1)
+    time_s = np.repeat(moments_s, surprises[0].white.shape[-1])
+    return Innovations(time_s, value, np.where(np.isfinite(value), 1.0, np.nan), np.ones(value.shape, bool))

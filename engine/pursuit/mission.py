@@ -143,9 +143,13 @@ def fly(scenario: PursuitScenario, trials: Sequence[int]) -> PursuitMission:
 
 
 def _recorded(scenario: PursuitScenario, motion: Motion) -> PursuitMission:
-    log = read(scenario)
+    log, d = read(scenario), scenario.dimensions
     truth = {"target": log.truth[None]}
-    nothing = Moments(np.zeros((1, 1)), np.zeros((1, 1, 1)))
+    truth |= {name: np.broadcast_to(p[:2], (1, len(log.time_s), 2)) for name, p in zip(log.names, log.places)}
+    mean, sigma = np.zeros((1, d + 1)), np.full(d + 1, scenario.initial.position_sigma_m)
+    mean[:, :d] = log.places[:, :d].mean(axis=0)
+    sigma[-1] = np.radians(scenario.initial.heading_sigma_deg)
+    first = Moments(mean, np.diag(sigma**2)[None])
     return PursuitMission(
         scenario,
         log.time_s,
@@ -153,7 +157,7 @@ def _recorded(scenario: PursuitScenario, motion: Motion) -> PursuitMission:
         log.names,
         motion,
         np.zeros((1, 0, 1)),
-        nothing,
+        first,
         log=log,
         options=scenario.options,
     )

@@ -21,6 +21,13 @@ class FilterOptions(BaseModel):
         1, description="linearizations of an update; C19 has one, more count where the belief is wide"
     )
 
+    range_sigma_m: Annotated[float, Field(gt=0, le=1e4)] | None = Field(
+        None, description="noise of an arrival it assumes, m, where that is not the channel's (C19: R = 0.04 m^2)"
+    )
+    speed_mps: Annotated[float, Field(ge=0, le=100)] | None = Field(
+        None, description="speed of the target it assumes, m/s, where that is not the target's"
+    )
+
     @property
     def rule(self) -> Rule:
         return RULES[self.points]

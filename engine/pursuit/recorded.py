@@ -15,8 +15,9 @@ from engine.scenario.pursuit import PursuitScenario, Recorded
 
 @dataclass(frozen=True)
 class Log:
-    """Pings heard: arrival_s (pings, receivers), NaN where not; places (receivers, 3) m.
+    """Pings that enough receivers heard for a position: arrival_s (pings, receivers), NaN where not.
 
+    places (receivers, 3) m.
     time_s (pings,) is each ping's first arrival, truth (pings, 2) m the reference then, NaN where there is none.
     """
 
@@ -41,10 +42,12 @@ def read(scenario: PursuitScenario) -> Log:
     if mission.names and len(mission.names) != len(places):
         _refuse("mission.names", f"{len(mission.names)} names for {len(places)} receivers", "give one for each")
     names = tuple(mission.names) or tuple(f"r{n + 1}" for n in range(len(places)))
-    heard = np.isfinite(arrivals).any(axis=0)
+    heard = np.isfinite(arrivals).sum(axis=0) > scenario.dimensions
+    if heard.sum() < 2:
+        _refuse("mission.arrivals", "has no two pings that enough receivers heard", "give a longer recording")
     arrival_s = arrivals[:, heard].T
     time_s = np.nanmin(arrival_s, axis=1)
-    if len(time_s) < 2 or not (np.diff(time_s) > 0).all():
+    if not (np.diff(time_s) > 0).all():
         _refuse("mission.arrivals", "its pings are not in order of time", "sort the columns")
     return Log(names, places, arrival_s, time_s, _reference(mission, folder, time_s))
 

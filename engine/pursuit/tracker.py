@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from engine.gaussian.forms import Moments
 from engine.pursuit.arrivals import Surprise, update
 from engine.pursuit.mission import PursuitMission
-from engine.pursuit.options import PursuitOptions
+from engine.pursuit.options import FilterOptions
 from engine.pursuit.sigma_points import Rule
 from engine.pursuit.target import Motion, jitter, predict
 
@@ -51,10 +52,12 @@ class Tracker:
         self._reported = 0
 
     @classmethod
-    def of(cls, mission: PursuitMission, first: Moments, options: PursuitOptions) -> Tracker:
+    def of(cls, mission: PursuitMission, first: Moments, options: FilterOptions) -> Tracker:
         """A mission's tracker that begins with a belief of each holder, (trials, H, d+1)."""
-        noise_m, jitter_s = mission.scenario.network.range_sigma_m, mission.scenario.target.ping_jitter_s
-        return cls(first, mission.motion, noise_m, jitter_s, options.rule, options.iterations, mission.time_s)
+        noise_m = mission.scenario.network.range_sigma_m if options.range_sigma_m is None else options.range_sigma_m
+        motion = mission.motion if options.speed_mps is None else replace(mission.motion, speed_mps=options.speed_mps)
+        jitter_s = mission.scenario.target.ping_jitter_s
+        return cls(first, motion, noise_m, jitter_s, options.rule, options.iterations, mission.time_s)
 
     def advance(self, until_s: float) -> None:
         """Predict to a moment, reporting on the way; a report at that very moment waits for what happens then."""
@@ -97,7 +100,7 @@ class Tracker:
         kind = np.where(news, np.where(counts == known.shape[-1], Update.FULL, Update.PARTIAL), Update.NONE)
         self._counts = np.maximum(counts, self._counts)
         if not news.any():
-            return kind, Surprise(np.zeros(news.shape), np.zeros(news.shape, int))
+            return kind, Surprise(np.full(known.shape, np.nan))
         fix, surprise = update(
             self.prior,
             arrivals_m,
@@ -110,7 +113,7 @@ class Tracker:
         )
         self.fix = _where(news, fix, self.fix)
         self.now = _where(news, predict(self.fix, self._motion, self.now_s - self.ping_s, self._rule), self.now)
-        return kind, Surprise(np.where(news, surprise.nis, 0.0), np.where(news, surprise.dof, 0))
+        return kind, Surprise(np.where(news[..., None], surprise.white, np.nan))
 
 
 def _where(which: np.ndarray, this: Moments, that: Moments) -> Moments:

@@ -15,6 +15,7 @@ from engine.pursuit.mission import fly
 from engine.pursuit.options import PursuitOptions
 from engine.pursuit.tracker import Update
 from engine.registry import silent
+from engine.scenario import library, toml
 from tests.engine.pursuit.pursuits import NAMES, mission, scenario
 
 OPTIONS = PursuitOptions()
@@ -100,6 +101,19 @@ def test_a_fleet_on_a_line_through_the_target_stays_finite(changes):
         _, tracks = decentralized.fly(mission(**changes), PursuitOptions(points=rule), True, silent)
         for belief in tracks.beliefs.values():
             assert np.isfinite(belief.mean).all() and np.linalg.eigvalsh(belief.cov).min() > 0
+
+
+def test_in_space_the_loop_holds_with_four_vehicles():
+    flight = fly(toml.override(library.find("pursuit-in-space"), {"duration_s": 700.0}), range(4))
+    options = PursuitOptions(range_sigma_m=1.0)
+    for tracks in (
+        decentralized.fly(flight, options, True, silent)[1],
+        centralized.fly(flight, options, silent)[1],
+    ):
+        belief = tracks.beliefs["target-narcissus"]
+        away = np.linalg.norm(belief.mean - flight.truth["target-narcissus"], axis=-1)
+        assert np.isfinite(belief.mean).all() and np.linalg.eigvalsh(belief.cov).min() > 0
+        assert np.median(away) < 30.0
 
 
 def test_a_trial_is_the_same_in_any_block():

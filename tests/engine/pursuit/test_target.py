@@ -19,9 +19,9 @@ def walked(motion: Motion, start: np.ndarray, seconds: float, step_s: float, see
 
 @pytest.mark.parametrize("psd", [1e-4, 0.01, 0.1])
 def test_a_displacement_has_the_moments_of_many_walks(psd):
-    """40 000 walks in steps of 0.2 s; five standard errors."""
+    """20 000 walks in steps of 0.4 s; five standard errors."""
     motion, T = Motion(1.2, psd), 28.0
-    end = walked(motion, np.zeros((40_000, 3)), T, 0.2)
+    end = walked(motion, np.zeros((20_000, 3)), T, 0.4)
     exact = wandering(motion, T)
     n = len(end)
     assert end[:, 0].mean() == pytest.approx(exact.ahead_m, abs=5 * end[:, 0].std() / np.sqrt(n) + 1e-3)

@@ -13,7 +13,14 @@ SIMULATED = [
     *(f"walls2012-{what}" for what in ("two-node", "two-node-lossy", "lost-communication")),
     *(f"rui-chitre-{what}" for what in ("one-step", "gap", "regions", "steady-safe", "steady-dangerous")),
 ]
-RECORDED = ["plaza1-four-beacons", "plaza1-two-beacons", "marine-diver", "goats-auv", "mrclam6-five-robots"]
+RECORDED = [
+    "plaza1-four-beacons",
+    "plaza1-two-beacons",
+    "marine-diver",
+    "goats-auv",
+    "mrclam6-five-robots",
+    "yaps-hydrophones",
+]
 
 
 def assert_claims_hold(name: str) -> None:
