@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from server.scenes.graph import Graph
+
 
 @dataclass
 class Track:
@@ -37,13 +39,15 @@ class Packet:
 
 @dataclass(frozen=True)
 class Footage:
-    """A job's mission: report times, subjects, truth {S: (T, 2)} m of trial 0, packets by time of launch."""
+    """A job's mission: report times, subjects, truth {S: (T, 2)} m of trial 0, packets by time of launch; and, of the
+    algorithms that keep them, factor graphs {algorithm: {subject: graph}}."""
 
     time_s: np.ndarray
     subjects: list[dict[str, Any]]
     truth: dict[str, np.ndarray]
     packets: list[Packet]
     tracks: dict[str, Track]
+    graphs: dict[str, dict[str, Graph]] = field(default_factory=dict)
 
     @property
     def names(self) -> list[str]:

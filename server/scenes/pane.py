@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import rich
 
-from server.scenes import inner, palette
+from server.scenes import graph, inner, palette
 from server.scenes.footage import Footage, at
 from server.scenes.geometry import SPAN, Chart, dashes, ellipses, round_length, segments
 from server.view import thinned
@@ -26,8 +26,8 @@ FIELD_OF_VIEW = np.radians(50.0)
 
 @dataclass(frozen=True)
 class Options:
-    """What to show: estimated trails, ranging rays, past ellipses; a vehicle to follow; the view from above;
-    and vehicles to leave out."""
+    """What to show: estimated trails, ranging rays, past ellipses; a vehicle to follow; the view from above; a vehicle
+    whose factor graph to draw, where the estimator keeps one; and vehicles to leave out."""
 
     trails: bool = True
     rays: bool = True
@@ -35,6 +35,7 @@ class Options:
     follow: str | None = None
     top: bool = False
     hidden: tuple[str, ...] = ()
+    graph: str | None = None
 
 
 class Pane:
@@ -47,6 +48,7 @@ class Pane:
         self._lock = threading.Lock()
         self.footage: Footage
         self._chart: Chart
+        self._graphed = False
         self._truth: dict[str, np.ndarray] = {}
         self._without: tuple[str, ...] | None = None
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -131,6 +133,7 @@ class Pane:
             self._trails(algorithm, moment_s, now, options)
             self._present(algorithm, moment_s, now, truth)
             self._rays(moment_s, now, truth, options)
+            self._graph(algorithm, moment_s, options.graph)
             self._place(now, truth)
 
     def _trails(self, algorithm: str, moment_s: float, now: dict[str, np.ndarray], options: Options) -> None:
@@ -193,6 +196,30 @@ class Pane:
             lines.append(segments(self._chart.place(np.stack(ends), depths)))
             colours.append(palette.faded(colour, 0.85 * age))
         self._lines("/rays", lines, colours, 2.5)
+
+    def _graph(self, algorithm: str, moment_s: float, whose: str | None) -> None:
+        """The factor graph of a vehicle up to the moment, or everybody's; nothing where there is none or it is off."""
+        graphs = self.footage.graphs.get(algorithm, {})
+        found = None if whose is None else graphs.get(whose, graphs.get(""))
+        if found is None and not self._graphed:
+            return
+        self._graphed = found is not None
+        names = self.footage.names
+        drawn = graph.drawing(found, moment_s, self._chart, lambda n: self._depth(names[n])) if found else None
+        self._lines("/graph/ranges", drawn.ranges if drawn else [], drawn.range_colours if drawn else [], 1.0)
+        self._lines("/graph/links", drawn.lines if drawn else [], drawn.colours if drawn else [], 1.5)
+        points, colours = (drawn.dots, drawn.dot_colours) if drawn else (np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
+        if not len(points):
+            points, colours = np.full((1, 3), -1000.0), np.full((1, 3), palette.WATER, np.uint8)
+        self.server.scene.add_point_cloud(
+            "/graph/poses",
+            points.astype(np.float32),
+            colours,
+            point_size=graph.DOT,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
 
     def _place(self, now: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> None:
         for n, name in enumerate(self.footage.names):

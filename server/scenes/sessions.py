@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from server import artifacts
 from server.jobs import Jobs
 from server.problems import Refusal
+from server.scenes import graph
 from server.scenes.cameras import ABOVE, OBLIQUE, Cameras
 from server.scenes.footage import Footage, at, footage
 from server.scenes.geometry import Chart, chart
@@ -152,11 +154,9 @@ class Session:
                     raise ValueError("option hidden: a list of names is expected")
                 chosen[key] = tuple(value)
                 continue
-            right = isinstance(value, str | None) if key == "follow" else isinstance(value, bool)
-            if not right:
-                raise ValueError(
-                    f"option {key}: {'a name or null' if key == 'follow' else 'true or false'} is expected"
-                )
+            named = known[key].default is None
+            if not isinstance(value, str | None if named else bool):
+                raise ValueError(f"option {key}: {'a name or null' if named else 'true or false'} is expected")
         if chosen.get("top", self._options.top) != self._options.top:
             self._cameras.move(ABOVE if chosen["top"] else OBLIQUE)
         self._options = replace(self._options, **chosen)
@@ -185,8 +185,11 @@ class Session:
                         self._footage.tracks[news["algorithm"]].grow(news)
                         self._stale.set()
             if jobs.find(job).state == "done":
-                view = json.loads(await asyncio.to_thread(jobs.view, job))
-                await self._stage(footage(view, names))
+                text = await asyncio.to_thread(jobs.view, job)
+                assert text is not None, "a job that is done has a view"
+                view = json.loads(text)
+                graphs = await asyncio.to_thread(_graphs, jobs, job, view)
+                await self._stage(replace(footage(view, names), graphs=graphs))
         except Refusal as refusal:
             await self._send({"type": "error", "detail": refusal.detail})
         except asyncio.CancelledError:
@@ -251,6 +254,17 @@ class Session:
     def _show_panes(self, moment: float) -> None:
         for name, (_, pane) in self._panes.items():
             pane.show(name, moment, self._options)
+
+
+def _graphs(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, dict[str, graph.Graph]]:
+    """The factor graphs of a finished job, of the algorithms that keep them."""
+    names = [s["name"] for s in view["subjects"]]
+    found = {}
+    for algorithm, told in view["algorithms"].items():
+        if told.get("graph"):
+            path = jobs.artifact(job, artifacts.graph_file(algorithm))
+            found[algorithm] = graph.read(json.loads(path.read_text(encoding="utf-8")), names)
+    return found
 
 
 async def _undisturbed(draw: Callable[..., None], *arguments: Any) -> None:

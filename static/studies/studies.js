@@ -1,6 +1,7 @@
 // Studies of the picked mission: how it fares as more packets are lost, and W11's Table I, measured.
 
 import { el, part } from "../look/dom.js";
+import { buildReconstructionStudy, reconstructs } from "../smoothing/reconstruction.js";
 import { store } from "../state/store.js";
 import { buildLossStudy } from "./loss.js";
 import { buildTable } from "./table1.js";
@@ -9,6 +10,7 @@ export function mountStudies() {
   const root = part("studies");
   let loss = null;
   let table = null;
+  let reconstruction = null;
   store.watch(["run", "mission", "scenario"], ({ run, mission, scenario }) => {
     const networked = run === null && scenario?.family === "navigation" && Boolean(scenario.network?.tdma);
     root.hidden = !networked;
@@ -16,9 +18,12 @@ export function mountStudies() {
     if (loss === null) {
       loss = buildLossStudy();
       table = buildTable();
-      root.append(loss.root, table.root);
+      reconstruction = buildReconstructionStudy();
+      root.append(reconstruction.root, loss.root, table.root);
     }
     loss.of(mission, scenario);
+    loss.root.hidden = reconstructs(scenario);
+    reconstruction.of(mission, scenario);
     table.root.hidden = !mission.startsWith("walls2011");
   });
 }

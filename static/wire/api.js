@@ -69,6 +69,7 @@ export const analyseTracking = (body, signal) => request("/api/tracking/analysis
 export const trackingRegions = (body) => request("/api/tracking/regions", { method: "POST", body });
 export const tablePlan = () => request("/api/tables/walls2011-table-1");
 export const tableOf = (runs) => request("/api/tables/walls2011-table-1", { method: "POST", body: runs });
+export const graph = (id, algorithm) => request(`${job(id)}/graphs/${encodeURIComponent(algorithm)}`);
 export const eventsPath = (id) => `${job(id)}/events`;
 
 /** Deletes a job even while the page goes. */

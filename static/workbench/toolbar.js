@@ -3,12 +3,14 @@
 import { el, part } from "../look/dom.js";
 import { vehicleColour } from "../look/palette.js";
 import { dot } from "../look/swatch.js";
+import { tellers } from "../smoothing/story.js";
 import { store } from "../state/store.js";
 
 const OPTIONS = {
   trails: { label: "Trails", on: true, hint: "Estimated tracks up to now" },
   ellipses: { label: "Ellipses", on: true, hint: "95 % ellipses along the track" },
   rays: { label: "Rays", on: true, hint: "Packets: the sender's colour when heard, grey when lost" },
+  graph: { label: "Graph", on: false, hint: "Factor graph of the chosen vehicle, smoothed: received poses solid, lost ones hollow, priors square, composed links as arcs" },
   follow: { label: "Follow", on: false, hint: "Keep the chosen vehicle in the middle" },
   top: { label: "From above", on: false, hint: "Look straight down, north up" },
 };
@@ -18,8 +20,9 @@ export function mountToolbar(session) {
   const boxes = {};
   const tell = () => {
     const chosen = Object.fromEntries(Object.entries(boxes).map(([name, box]) => [name, box.checked]));
+    const named = (on) => (on ? store.state.vehicle : null);
     const hidden = [...store.state.hidden.vehicles];
-    session.options({ ...chosen, hidden, follow: chosen.follow ? store.state.vehicle : null });
+    session.options({ ...chosen, hidden, follow: named(chosen.follow), graph: named(chosen.graph) });
   };
   const toggles = Object.entries(OPTIONS).map(([name, { label, on, hint }]) => {
     boxes[name] = el("input", { type: "checkbox", name: `pane-${name}`, checked: on, onchange: tell });
@@ -39,7 +42,8 @@ export function mountToolbar(session) {
     for (const input of vehicles.querySelectorAll("input")) input.checked = input.value === vehicle;
   });
   store.watch(["hidden"], tell);
-  store.watch(["vehicle"], () => boxes.follow.checked && tell());
+  store.watch(["vehicle"], () => (boxes.follow.checked || boxes.graph.checked) && tell());
+  store.watch(["view"], ({ view }) => (boxes.graph.parentElement.hidden = !tellers(view).length));
 }
 
 function choice({ name, kind }, n) {
