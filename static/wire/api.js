@@ -43,7 +43,8 @@ async function request(path, { method = "GET", body, raw, type = "application/js
     throw new Unreachable();
   }
   if (!response.ok) throw await problemOf(response);
-  return response.status === 204 ? null : response.json();
+  const text = await response.text();
+  return text === "" ? null : JSON.parse(text);
 }
 
 const job = (id) => `/api/jobs/${encodeURIComponent(id)}`;
@@ -56,6 +57,11 @@ export const schema = (family) => request(`/api/schemas/${encodeURIComponent(fam
 export const edited = (name, set, signal) => request(`/api/scenarios/${encodeURIComponent(name)}/edited`, { method: "POST", body: { set }, signal });
 export const saveScenario = (name, scenario) => request(`/api/scenarios/${encodeURIComponent(name)}`, { method: "PUT", body: scenario });
 export const importToml = (name, text) => request(`/api/scenarios/${encodeURIComponent(name)}`, { method: "PUT", raw: text, type: "application/toml" });
+export const logs = () => request("/api/logs");
+export const describeLog = (log) => request(`/api/logs/${encodeURIComponent(log)}`);
+export const sendLogFile = (log, name, file) => request(`/api/logs/${encodeURIComponent(log)}/${encodeURIComponent(name)}`, { method: "PUT", raw: file, type: "text/csv" });
+export const previewLog = (log, scenario, signal) => request(`/api/logs/${encodeURIComponent(log)}/preview`, { method: "POST", body: { scenario }, signal });
+export const removeLog = (log) => request(`/api/logs/${encodeURIComponent(log)}`, { method: "DELETE" });
 export const jobs = () => request("/api/jobs");
 export const findJob = (id, signal) => request(job(id), { signal });
 export const view = (id, signal) => request(`${job(id)}/view`, { signal });
