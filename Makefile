@@ -2,12 +2,15 @@
 # make test    set everything up and run every test
 # make lint    ruff and pyright
 # make bench   speed against peers, in one run each
+# make soak    the service under kills, floods, malice and for long: hours; make soak SOAK=short takes minutes
+# make audit   known faults of the dependencies, where the network has the list of them
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PYTEST_ARGS ?=
+SOAK ?= full
 
-.PHONY: serve test lint bench browser clean
+.PHONY: serve test lint bench soak audit browser clean
 
 serve: $(VENV)/.installed
 	$(BIN)/coopnav serve $(SERVE_ARGS)
@@ -22,6 +25,18 @@ lint: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-test
 	$(BIN)/pytest tests/benchmarks -o python_files='bench_*.py' -s
+
+soak: $(VENV)/.installed-test
+	COOPNAV_SOAK=$(SOAK) $(BIN)/pytest tests/soak -o python_files='soak_*.py' --show-capture=no $(PYTEST_ARGS)
+
+# pip-audit in an environment of its own; where the list of faults cannot be reached this says so and is no failure.
+audit: $(VENV)/.installed
+	@$(VENV)/audit/bin/pip-audit --version >/dev/null 2>&1 \
+	  || { $(VENV)/bin/python -m venv $(VENV)/audit && $(VENV)/audit/bin/pip install --quiet --retries 1 --timeout 10 pip-audit; } \
+	  || { echo "audit: NOT DONE, pip-audit cannot be installed here"; exit 0; }; \
+	if $(BIN)/python -c "import urllib.request; urllib.request.urlopen('https://pypi.org/pypi/pip/json', timeout=10)" 2>/dev/null; \
+	then $(VENV)/audit/bin/pip-audit --strict --disable-pip --no-deps -r constraints.txt; \
+	else echo "audit: NOT DONE, the list of known faults (pypi.org) cannot be reached from here"; fi
 
 # The browser tests need a Chromium: the one named or found, else Debian's.
 browser:

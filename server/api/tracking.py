@@ -15,7 +15,9 @@ router = APIRouter(prefix="/api/tracking", tags=["tracking"])
 #: A map of turned ellipses is iterated cell by cell, in two dimensions.
 MOST_TURNED = 48
 
-Variance = Annotated[float, Field(gt=0, le=1e9)]
+#: A millimetre and a kilometre of standard deviation, squared: beyond that ratio a double has no digits left.
+SMALLEST, LARGEST = 1e-6, 1e6
+Variance = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
 
 
 class Point(BaseModel):
@@ -23,9 +25,9 @@ class Point(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    process: Annotated[float, Field(ge=0, le=1e9)] = Field(description="variance of the target's step")
+    process: Annotated[float, Field(ge=0, le=LARGEST)] = Field(description="variance of the target's step")
     sensors: list[Variance] = Field(min_length=2, max_length=analysis.MOST_SENSORS, description="noise variances")
-    prior: Annotated[float, Field(ge=0, le=1e9)] = Field(description="variance of the common first estimate")
+    prior: Annotated[float, Field(ge=0, le=LARGEST)] = Field(description="variance of the common first estimate")
     steps: int = Field(30, ge=1, le=analysis.MOST_STEPS)
     trials: int = Field(2000, ge=1, le=analysis.MOST_TRIALS)
     seed: int = Field(1, ge=0, lt=2**63)

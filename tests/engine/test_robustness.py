@@ -97,8 +97,13 @@ WORDS = (
 )
 
 
+def texts() -> st.SearchStrategy[bytes]:
+    """Shipped scenario files, damaged."""
+    return st.sampled_from(library.names()).flatmap(lambda name: damaged(source(name), WORDS))
+
+
 @settings(QUICK, max_examples=150)
-@given(st.sampled_from(library.names()).flatmap(lambda name: damaged(source(name), WORDS)))
+@given(texts())
 def test_a_damaged_scenario_file_is_read_or_refused_in_words(data: bytes):
     read(data.decode("utf-8", "replace"))
 
@@ -111,6 +116,11 @@ def source(name: str) -> bytes:
 @settings(QUICK, max_examples=150)
 @given(st.sampled_from(templates()).flatmap(disturbed))
 def test_disturbed_tables_are_a_scenario_or_refused_in_words(tables: dict):
+    check_tables(tables)
+
+
+def check_tables(tables: dict) -> None:
+    """Tables are a scenario that can be written and read again, or refused in words."""
     try:
         scenario = toml.validate(tables)
     except ScenarioError as error:
