@@ -8,10 +8,13 @@ import numpy as np
 
 from engine.pursuit.arrivals import Surprise
 from engine.pursuit.mission import PursuitMission, subject
+from engine.pursuit.response import Response, break_frequency, response
 from engine.pursuit.tracker import Tracker, Update
 from engine.pursuit.water import Ping, Water
 from engine.tracks import Belief, Innovations, PacketCount, Series, Tracks
 
+#: Units of figures by how their keys end; others are shares.
+UNITS = {"m": "m", "s": "s", "rps": "rad/s"}
 #: What a vehicle's own satellite position is good for, m, one sigma of each axis (RTK).
 GPS_SIGMA_M = 0.02
 
@@ -81,7 +84,7 @@ def tracks(diary: Diary, water: Water, tracker: Tracker, packets: PacketCount, n
         away = np.linalg.norm(path[:, i] - truth - mission.offsets[i], axis=-1)
         series[f"formation_error_m/{name}"] = Series(f"Formation error of {name}", "m", away, (name,))
         for key, (title, value) in _figures(diary, int(h)).items():
-            unit = {"m": "m", "s": "s"}.get(key.rpartition("_")[2], "1")
+            unit = UNITS.get(key.rpartition("_")[2], "1")
             series[f"{key}/{name}"] = Series(f"{title} of {name}", unit, value, (subject(name),))
         heard[subject(name)] = innovations(end_s, diary.surprises, int(h))
     return Tracks(beliefs=beliefs, packets=packets, innovations=heard, series=series, notes=notes)
@@ -127,7 +130,21 @@ def _figures(diary: Diary, h: int) -> dict[str, tuple[str, np.ndarray]]:
         near = (trailing < length).astype(float)
         title = f"{word.capitalize()} in the mission: share of fixes within a formation length of where the target is"
         found[f"{word}_kept"] = (title, placed(near, (kind != Update.NONE) & within))
+    followed = responses(diary, h)
+    if followed is not None:
+        value = np.full((kind.shape[0], len(time_s)), np.nan)
+        value[:, -1] = break_frequency(followed)
+        found["break_rps"] = ("Break of the transfer function from the target's turning to full fixes", value)
     return found
+
+
+def responses(diary: Diary, h: int) -> Response | None:
+    """How one holder's full-information fixes follow the target's turns, in every trial (C19 Fig. 3-12)."""
+    step_s, end_s = diary.mission.scenario.step_s, np.array([s.end_s for s in diary.slots])
+    turn_rps = np.diff(diary.mission.target[..., -1], axis=1)[:, : int(diary.mission.time_s[-1] / step_s)] / step_s
+    full = np.stack([s.kind[:, h] for s in diary.slots], axis=1) == Update.FULL
+    error_m = np.where(full, np.stack([e[:, h] for e in diary.trailing_m], axis=1), np.nan)
+    return response(turn_rps, step_s, end_s, error_m)
 
 
 def _first_of_cycle(diary: Diary, kind: np.ndarray) -> np.ndarray:
