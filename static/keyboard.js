@@ -2,6 +2,7 @@
 
 import { clock } from "./state/clock.js";
 import { store } from "./state/store.js";
+import { zoom } from "./state/zoom.js";
 import { stepEvent, stepTime } from "./workbench/timeline.js";
 
 const KEYS = {
@@ -12,6 +13,9 @@ const KEYS = {
   End: () => clock.seek(clock.end),
   "[": () => clock.shift(-1),
   "]": () => clock.shift(1),
+  "+": () => zoom.by(2),
+  "-": () => zoom.by(0.5),
+  Escape: () => zoom.reset(),
 };
 
 /** Keys that an element wants for itself. */

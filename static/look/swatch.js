@@ -3,7 +3,11 @@ import { lineStyle } from "./palette.js";
 
 /** A short sample of an algorithm's line, as it looks in the plots. */
 export function lineSample(name, algorithms) {
-  const { colour, dash } = lineStyle(name, algorithms);
+  return sample(lineStyle(name, algorithms));
+}
+
+/** A short sample of a line: {colour, dash}. */
+export function sample({ colour, dash }) {
   return svg(
     "svg",
     { class: "line-sample", viewBox: "0 0 26 8", width: 26, height: 8, "aria-hidden": "true" },

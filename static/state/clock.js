@@ -53,6 +53,14 @@ class Clock {
     if (this.following) this.#move(time);
   }
 
+  /** Back to the newest estimate of a live run, and along with it. */
+  follow(time) {
+    this.pause();
+    this.following = true;
+    this.#move(time);
+    this.#tell();
+  }
+
   #move(time) {
     const within = this.#within(time);
     if (within === this.time) return;

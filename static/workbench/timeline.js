@@ -4,8 +4,11 @@ import { el, part, say, svg } from "../look/dom.js";
 import { clockTime, count } from "../look/format.js";
 import { darkScheme } from "../look/palette.js";
 import { SPEEDS, clock } from "../state/clock.js";
+import { hover } from "../state/hover.js";
+import { atWork } from "../state/run.js";
 import { indexAt } from "../state/samples.js";
 import { store } from "../state/store.js";
+import { zoom } from "../state/zoom.js";
 import { happenings } from "./happenings.js";
 import { buildLegend } from "./legend.js";
 
@@ -13,12 +16,15 @@ const NOTHING = { heard: [], lost: [], fixes: [], moments: [] };
 /** Height of a lane of marks, px; the lanes lie under the slider, inset by half its thumb. */
 const LANE = 7;
 const INSET = 8;
+/** A mark this near to the pointer (px) is meant. */
+const NEAR = 6;
 
-let events = NOTHING;
+/** What happened in the open run, and the times of its moments. */
+let events = { ...NOTHING, times: [] };
 
 /** Moves to the next (+1) or previous (-1) event. */
 export function stepEvent(direction) {
-  const times = events.moments.map((m) => m.time_s);
+  const { times } = events;
   const here = clock.time;
   const next = direction > 0 ? times.find((t) => t > here + 0.01) : times.findLast((t) => t < here - 0.01);
   if (next !== undefined) clock.seek(next);
@@ -40,30 +46,37 @@ export function mountTimeline() {
   const forth = button("forth", "Next event (Shift+→)", () => stepEvent(1), ICONS.forth);
   const speed = el(
     "select",
-    { id: "speed", "aria-label": "Speed", title: "Mission time per real time ([ and ])", onchange: () => clock.setSpeed(Number(speed.value)) },
+    { id: "speed", "aria-label": "Playback speed", title: "Mission time per real time ([ and ])", onchange: () => clock.setSpeed(Number(speed.value)) },
     SPEEDS.map((s) => el("option", { value: s }, `${s}×`)),
   );
   const now = el("output", { class: "now", for: "time" });
   const end = el("span", { class: "end" });
   const words = el("span", { class: "event" });
+  const whole = el("button", { type: "button", class: "small whole", title: "Show the whole mission (Esc)", onclick: () => zoom.reset() });
+  const live = el("button", { type: "button", class: "small live", title: "Follow the newest estimates", onclick: () => clock.follow(store.state.live?.latest_s ?? clock.end) }, "● Live");
   const slider = el("input", { id: "time", type: "range", min: 0, max: 1, step: "any", "aria-label": "Mission time", oninput: () => clock.seek(Number(slider.value)) });
   const lanes = el("canvas", { class: "lanes", height: 3 * LANE, "aria-hidden": "true" });
   const key = el("div", { class: "lane-keys" });
-  const track = el("div", { class: "track" }, slider, lanes);
+  const probe = el("div", { class: "cursor probe", "aria-hidden": "true", hidden: true }, el("span"));
+  const track = el("div", { class: "track" }, slider, lanes, probe);
   part("timeline").append(
-    el("div", { class: "controls" }, play, back, forth, speed, el("span", { class: "times" }, now, end), words, key),
+    el("div", { class: "controls" }, play, back, forth, speed, el("span", { class: "times" }, now, end), live, words, whole, key),
     track,
     buildLegend(),
   );
 
   const tick = () => {
-    slider.min = String(clock.start);
-    slider.max = String(clock.end);
+    const [from, to] = zoom.span;
+    slider.min = String(from);
+    slider.max = String(to);
     slider.value = String(clock.time);
     slider.disabled = clock.end <= clock.start;
     slider.setAttribute("aria-valuetext", clockTime(clock.time));
     say(now, clockTime(clock.time, true));
     say(end, ` / ${clockTime(clock.end)}`);
+    whole.hidden = !zoom.on;
+    say(whole, `${clockTime(from)} – ${clockTime(to)} ×`);
+    live.hidden = clock.following || !atWork(store.state.job) || !store.state.live;
     if (speed.value !== String(clock.speed)) speed.value = String(clock.speed);
     if (play.dataset.playing !== String(clock.playing)) {
       play.dataset.playing = String(clock.playing);
@@ -71,16 +84,18 @@ export function mountTimeline() {
       play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
       play.title = clock.playing ? "Pause (space)" : "Play (space)";
     }
-    const { moments } = events;
-    const n = indexAt(moments.map((m) => m.time_s), clock.time);
-    say(words, n < 0 ? "" : `${clockTime(moments[n].time_s)} ${moments[n].words}`);
+    const n = indexAt(events.times, clock.time);
+    tell(events.moments[n]);
   };
+  const tell = (moment) => say(words, moment ? `${clockTime(moment.time_s)} ${moment.words}` : "");
   clock.watch(tick);
+  store.watch(["job"], tick);
   tick();
 
   const draw = () => paint(lanes, events);
   store.watch(["view", "hidden"], ({ view, hidden }) => {
-    events = view ? happenings(view, hidden.vehicles) : NOTHING;
+    const found = view ? happenings(view, hidden.vehicles) : NOTHING;
+    events = { ...found, times: found.moments.map((m) => m.time_s) };
     key.replaceChildren(
       mark("heard", `${count(events.heard.length)} heard`),
       mark("lost", `${count(events.lost.length)} lost`),
@@ -93,18 +108,48 @@ export function mountTimeline() {
   });
   new ResizeObserver(draw).observe(track);
   darkScheme.addEventListener("change", draw);
+  zoom.watch(() => {
+    draw();
+    tick();
+  });
 
-  const seek = (event) => {
-    if (event.buttons !== 1) return;
+  const timeAt = (event) => {
     const box = lanes.getBoundingClientRect();
     const share = (event.clientX - box.left - INSET) / (box.width - 2 * INSET);
-    clock.seek(clock.start + share * (clock.end - clock.start));
+    const [from, to] = zoom.span;
+    return from + Math.min(Math.max(share, 0), 1) * (to - from);
+  };
+  hover.watch(() => {
+    const [from, to] = zoom.span;
+    probe.hidden = hover.time === null || hover.time < from || hover.time > to || to <= from;
+    if (probe.hidden) return;
+    const x = INSET + ((hover.time - from) / (to - from)) * (lanes.clientWidth - 2 * INSET);
+    probe.style.transform = `translateX(${x.toFixed(1)}px)`;
+  });
+  const seek = (event) => {
+    if (event.buttons === 1) clock.seek(timeAt(event));
+    else point(event);
+  };
+  /** The mark under the pointer, in words. */
+  const point = (event) => {
+    const time = timeAt(event);
+    const [from, to] = zoom.span;
+    const reach = (NEAR / Math.max(1, lanes.clientWidth)) * (to - from);
+    const n = indexAt(events.times, time);
+    const near = [n, n + 1].filter((k) => Math.abs(events.times[k] - time) <= reach).sort((a, b) => Math.abs(events.times[a] - time) - Math.abs(events.times[b] - time));
+    hover.at(time);
+    if (near.length) tell(events.moments[near[0]]);
+    else tick();
   };
   lanes.addEventListener("pointerdown", (event) => {
     lanes.setPointerCapture(event.pointerId);
     seek(event);
   });
   lanes.addEventListener("pointermove", seek);
+  lanes.addEventListener("pointerleave", () => {
+    hover.at(null);
+    tick();
+  });
 }
 
 function mark(kind, text) {
@@ -124,10 +169,11 @@ function paint(canvas, { heard, lost, fixes }) {
   const pen = canvas.getContext("2d");
   pen.scale(ratio, ratio);
   const style = getComputedStyle(canvas);
-  const x = (t) => INSET + ((t - clock.start) / (clock.end - clock.start)) * (width - 2 * INSET);
+  const [start, end] = zoom.span;
+  const x = (t) => INSET + ((t - start) / (end - start)) * (width - 2 * INSET);
   const lane = (n, name, marks) => {
     pen.fillStyle = style.getPropertyValue(`--mark-${name}`);
-    for (const [from, to] of marks) pen.fillRect(x(from) - 0.5, n * LANE + 1, Math.max(1, x(to) - x(from)), LANE - 2);
+    for (const [from, to] of marks) if (to >= start && from <= end) pen.fillRect(x(from) - 0.5, n * LANE + 1, Math.max(1, x(to) - x(from)), LANE - 2);
   };
   lane(0, "heard", heard.map((p) => [p.toa_s, p.toa_s]));
   lane(1, "lost", lost.map((p) => [p.tol_s, p.tol_s]));

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import re
 
+import httpx
 from playwright.sync_api import Page, expect
 
 from tests.browser.eyes import difference, pixels, see_the_vehicles
-from tests.browser.serving import until
+from tests.browser.serving import Server, until
+
+#: A run that is at work for longer than the test.
+LONG = {"scenario": "walls2011-topology-c", "trials": 2000, "algorithms": ["dead_reckoning", "cekf"]}
 
 TWO_FRAMES = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
@@ -48,7 +52,7 @@ def test_space_plays_and_pauses(opened: Page):
 
 def test_brackets_change_the_speed(opened: Page):
     opened.locator("#stage").focus()
-    speed = opened.get_by_label("Speed", exact=True)
+    speed = opened.get_by_label("Playback speed")
     first = float(speed.input_value())
     opened.keyboard.press("]")
     assert float(speed.input_value()) > first
@@ -105,14 +109,16 @@ def test_a_plot_has_a_line_per_algorithm_and_its_cursor_follows(opened: Page, ke
     keep(opened)
 
 
-def test_dragging_in_a_plot_moves_time(opened: Page):
+def test_dragging_in_a_plot_with_shift_moves_time(opened: Page):
     ground = opened.locator(".plot[data-quantity=sigma_m] .nsewdrag").bounding_box()
     assert ground
     x, y = ground["x"], ground["y"] + 20
+    opened.keyboard.down("Shift")
     opened.mouse.move(x + 0.8 * ground["width"], y)
     opened.mouse.down()
     opened.mouse.move(x + 0.5 * ground["width"], y, steps=4)
     opened.mouse.up()
+    opened.keyboard.up("Shift")
     assert abs(now(opened) - 600) < 15
 
 
@@ -126,3 +132,34 @@ def test_pointing_at_a_plot_reads_all_curves_there(opened: Page):
     assert now(opened) == 1200, "pointing does not move time"
     opened.mouse.move(5, 5)
     expect(values.first).to_have_text(at_the_end[0])
+
+
+def test_marks_tell_what_happened_under_the_pointer(opened: Page):
+    lanes = opened.locator("#timeline .lanes").bounding_box()
+    assert lanes
+    opened.get_by_role("button", name="Previous event").click()
+    said = opened.locator(".event").inner_text()
+    share = now(opened) / 1200
+    opened.locator("#stage").focus()
+    opened.keyboard.press("Home")
+    opened.mouse.move(lanes["x"] + 8 + share * (lanes["width"] - 16), lanes["y"] + 3)
+    expect(opened.locator(".event")).to_have_text(said)
+    assert now(opened) == 0, "pointing does not move time"
+
+
+def test_a_live_run_follows_its_head_until_the_person_scrubs(page: Page, server: Server):
+    job = httpx.post(f"{server.url}/api/jobs", json=LONG, timeout=20).json()["id"]
+    page.goto(f"/#run={job}")
+    expect(page.locator(".now")).not_to_have_text("0:00:00.0")
+    live = page.get_by_role("button", name="Live")
+    expect(live).to_be_hidden()
+    page.locator("#stage").focus()
+    page.keyboard.press("Home")
+    expect(live).to_be_visible()
+    page.evaluate(TWO_FRAMES)
+    assert now(page) == 0, "time stays where it was put"
+    live.click()
+    expect(live).to_be_hidden()
+    until(lambda: now(page) > 0, "time to be at the head again")
+    page.locator("#headline").get_by_role("button", name="Cancel").click()
+    expect(page.locator("#headline .state")).to_have_text("cancelled")
