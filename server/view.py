@@ -98,7 +98,8 @@ def _algorithm(
         "series": {key: _series(series, keep) for key, series in tracks.series.items()},
         "surprise": {s: _surprise(seen, span) for s, seen in tracks.innovations.items()},
         "notes": list(tracks.notes),
-        "graph": first and bool(tracks.graph),
+        "graph": first and "graphs" in tracks.graph,
+        "schedule": first and "slots" in tracks.graph,
     }
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from engine.gaussian.forms import Moments
@@ -10,6 +12,7 @@ from engine.pursuit.messages import ENTRY_BYTES, ENTRY_FLOATS, WAYPOINT_BYTES, W
 from engine.pursuit.mission import PursuitMission
 from engine.pursuit.options import PursuitOptions
 from engine.pursuit.steering import Steering
+from engine.pursuit.story import story
 from engine.pursuit.tracker import Tracker, Update
 from engine.pursuit.water import Water
 from engine.registry import Progress
@@ -66,15 +69,15 @@ def fly(mission: PursuitMission, options: PursuitOptions, progress: Progress) ->
                 water.send(steering.waypoints(tracker), heard)
                 count += counted(V * spoke, heard, WAYPOINT_BYTES, WAYPOINT_FLOATS)
             sender = V if slot == V + 1 else slot - 1
-            diary.note(
-                Slot(cycle, slot, slot_s, told_s, sender, spoke, heard, kind, steering.aim(tracker)), tracker, surprise
-            )
+            aim, waypoints = steering.aim(tracker), water.fleet.waypoint
+            note = Slot(cycle, slot, slot_s, told_s, sender, spoke, heard, kind, ashore, aim, waypoints)
+            diary.note(note, tracker, surprise)
         cycle += 1
         progress(min(start_s / end_s, 1.0), None)
     water.sail(end_s)
     tracker.finish(end_s)
     count += PacketCount(mission_s=mission.trials * end_s)
-    return diary, tracks(diary, water, tracker, count)
+    return diary, replace(tracks(diary, water, tracker, count), graph=story(diary, tracker.sigma_m))
 
 
 def run(mission: PursuitMission, progress: Progress) -> Tracks:

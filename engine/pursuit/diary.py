@@ -22,7 +22,8 @@ GPS_SIGMA_M = 0.02
 @dataclass(frozen=True)
 class Slot:
     """One slot: sender's number (-1 the target, V the shore); who spoke (trials,), who heard (trials, V or V + 1),
-    kind of update (trials, H) at its end; aim (trials, H, 2), what the holders steer by then."""
+    kind of update (trials, H) and known arrivals (trials, H, V) at its end; aim (trials, H, 2), what the holders
+    steer by then, and the vehicles' waypoints (trials, V, 2)."""
 
     cycle: int
     number: int
@@ -32,7 +33,9 @@ class Slot:
     spoke: np.ndarray
     heard: np.ndarray
     kind: np.ndarray
+    known: np.ndarray
     aim: np.ndarray
+    waypoints: np.ndarray
 
 
 @dataclass

@@ -42,7 +42,7 @@ class Tracker:
     ) -> None:
         self.prior = self.fix = self.now = first
         self.now_s = self.ping_s = 0.0
-        self._motion, self._sigma_m, self._jitter_s = motion, sigma_m, jitter_s
+        self._motion, self.sigma_m, self._jitter_s = motion, sigma_m, jitter_s
         self._rule, self._iterations = rule, iterations
         trials, H, n = first.mean.shape
         self._counts = np.zeros((trials, H), int)
@@ -106,7 +106,7 @@ class Tracker:
             arrivals_m,
             known,
             places,
-            self._sigma_m,
+            self.sigma_m,
             self._rule,
             self._iterations,
             jitter(self.prior, self._motion, self._jitter_s),
