@@ -1,9 +1,10 @@
-"""The one place from which all panes of a session look at their scenes."""
+"""Where the panes of a session look at their scenes from: all from one place, or each from its own."""
 
 from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
 
 import numpy as np
 import viser
@@ -24,14 +25,18 @@ SAME = 0.01
 
 
 class Cameras:
-    """Position and point looked at, (6,) scene units, shared by all viewers; the pane moved last leads."""
+    """Position and point looked at, (6,) scene units, of every pane's viewers; where linked, the one moved last leads.
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
-        self._panes: list[Pane] = []
+    `moved(pose)` is told when a person has moved a camera and it rests.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, moved: Callable[[np.ndarray], None]) -> None:
+        self._loop, self._told = loop, moved
+        self._poses: dict[Pane, np.ndarray] = {}
         self._leader: Pane | None = None
         self._moved = 0.0
         self._again: asyncio.TimerHandle | None = None
+        self.linked = True
         self.pose = OBLIQUE
 
     def join(self, pane: Pane) -> None:
@@ -40,7 +45,7 @@ class Cameras:
         A viewer starts where viser's client puts it and says so, more than once; it is heard only when it has
         come to the pose it was given.
         """
-        self._panes.append(pane)
+        self._poses[pane] = self.pose
         pane.begin_at(self.pose)
 
         @pane.server.on_client_connect
@@ -55,38 +60,63 @@ class Cameras:
                 if settled:
                     self._loop.call_soon_threadsafe(self._lead, pane, pose)
                     return
-                settled = np.allclose(pose, self.pose, atol=SAME) or now > deadline
+                wanted = self._poses.get(pane, self.pose)
+                settled = np.allclose(pose, wanted, atol=SAME) or now > deadline
                 if not settled and now - told > TELL_S:
                     told = now
-                    _turn(client, self.pose)
+                    _turn(client, wanted)
 
-            _turn(client, self.pose)
+            _turn(client, self._poses.get(pane, self.pose))
 
     def leave(self, pane: Pane) -> None:
-        self._panes.remove(pane)
+        self._poses.pop(pane, None)
         if self._leader is pane:
             self._leader = None
 
-    def move(self, pose: np.ndarray) -> None:
+    def look(self, pose: np.ndarray) -> None:
         """Turn all viewers to a pose (6,)."""
         self.pose, self._leader, self._moved = pose, None, time.monotonic()
+        self._poses = dict.fromkeys(self._poses, pose)
         self._follow()
+
+    def shift(self, step: np.ndarray) -> None:
+        """Move all viewers and what they look at by a step (3,)."""
+        both = np.concatenate([step, step])
+        self.pose, self._leader, self._moved = self.pose + both, None, time.monotonic()
+        self._poses = {pane: pose + both for pane, pose in self._poses.items()}
+        self._follow()
+
+    def link(self, linked: bool) -> None:
+        """Let the viewers move together, all to where the one moved last is; or each by itself."""
+        if linked and not self.linked:
+            self.look(self.pose)
+        self.linked = linked
 
     def _lead(self, pane: Pane, pose: np.ndarray) -> None:
         now = time.monotonic()
-        if np.allclose(pose, self.pose, atol=SAME) or (self._leader is not pane and now - self._moved < LEAD_S):
+        if pane not in self._poses or np.allclose(pose, self._poses[pane], atol=SAME):
+            return
+        if self.linked and self._leader is not pane and now - self._moved < LEAD_S:
             return
         self.pose, self._leader, self._moved = pose, pane, now
+        if self.linked:
+            self._poses = dict.fromkeys(self._poses, pose)
+        else:
+            self._poses[pane] = pose
         self._follow()
         if self._again is not None:
             self._again.cancel()
-        self._again = self._loop.call_later(LEAD_S, self._follow)
+        self._again = self._loop.call_later(LEAD_S, self._rest)
+
+    def _rest(self) -> None:
+        self._follow()
+        self._told(self.pose)
 
     def _follow(self) -> None:
-        for pane in self._panes:
-            if pane is not self._leader:
+        for pane, pose in self._poses.items():
+            if pane is not self._leader and (self.linked or self._leader is None):
                 for client in pane.server.get_clients().values():
-                    _turn(client, self.pose)
+                    _turn(client, pose)
 
 
 def _turn(client: viser.ClientHandle, pose: np.ndarray) -> None:

@@ -30,13 +30,13 @@ class Chart:
         return np.concatenate([flat, down[..., None]], axis=-1)
 
 
-def chart(points_m: np.ndarray, deepest_m: float) -> Chart:
-    """The chart that shows points (N, 2) m, NaN among them allowed, in a square of SPAN."""
+def chart(points_m: np.ndarray, deepest_m: float, stretch: float = 0.0) -> Chart:
+    """The chart that shows points (N, 2) m, NaN among them allowed, in a square of SPAN; stretch 0 is what suits."""
     known = points_m[np.isfinite(points_m).all(axis=-1)]
     low, high = (known.min(axis=0), known.max(axis=0)) if len(known) else (np.full(2, -500.0), np.full(2, 500.0))
     scale = SPAN / max(float((high - low).max()), 10.0)
-    stretch = min(max(DEPTH_SHOWN / (deepest_m * scale), 1.0), DEPTH_STRETCH) if deepest_m > 0 else 1.0
-    return Chart((low + high) / 2, scale, stretch)
+    suits = min(max(DEPTH_SHOWN / (deepest_m * scale), 1.0), DEPTH_STRETCH) if deepest_m > 0 else 1.0
+    return Chart((low + high) / 2, scale, stretch or suits)
 
 
 def segments(line: np.ndarray) -> np.ndarray:
@@ -53,13 +53,20 @@ def dashes(line: np.ndarray) -> np.ndarray:
     return pairs[(np.cumsum(length) - length) // dash % 2 == 0]
 
 
-def ellipses(chart: Chart, mean_m: np.ndarray, cov_m2: np.ndarray, depth_m: float) -> np.ndarray:
-    """95 % ellipses of beliefs, mean (N, 2) m and cov (N, 3) as xx xy yy, as segments (N, CORNERS, 2, 3)."""
+def radius(sigma: float) -> float:
+    """Mahalanobis radius of an ellipse of so many standard deviations; 95 is for the 95 % region."""
+    return RADIUS_95 if sigma == 95 else float(sigma)
+
+
+def ellipses(
+    chart: Chart, mean_m: np.ndarray, cov_m2: np.ndarray, depth_m: float, radius: float = RADIUS_95
+) -> np.ndarray:
+    """Ellipses of beliefs, mean (N, 2) m and cov (N, 3) as xx xy yy, as segments (N, CORNERS, 2, 3)."""
     xx, xy, yy = cov_m2[:, 0], cov_m2[:, 1], cov_m2[:, 2]
     matrix = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)
     sound = np.isfinite(matrix.sum(axis=(1, 2))) & np.isfinite(mean_m.sum(axis=1))
     value, vector = np.linalg.eigh(np.where(sound[:, None, None], matrix, 0.0))
-    axes = vector * np.sqrt(np.maximum(value, 0.0))[:, None, :] * RADIUS_95
+    axes = vector * np.sqrt(np.maximum(value, 0.0))[:, None, :] * radius
     angle = np.linspace(0.0, 2 * np.pi, CORNERS + 1)
     circle = np.stack([np.cos(angle), np.sin(angle)])
     outline = np.swapaxes(axes @ circle, 1, 2) + np.where(sound[:, None], mean_m, 0.0)[:, None, :]
@@ -71,3 +78,20 @@ def round_length(metres: float) -> float:
     """The next smaller of 1, 2, 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(metres))
     return float(max(m for m in (power, 2 * power, 5 * power) if m <= metres * (1 + 1e-9)))
+
+
+def scale_bar(chart: Chart) -> tuple[np.ndarray, float]:
+    """A bar of a round length, in the south-west of the surface, as segments (M, 2, 3), and its length in metres."""
+    length_m = round_length(SPAN / chart.scale / 4)
+    west, south = -0.62 * SPAN, -0.69 * SPAN
+    east, tick = west + length_m * chart.scale, 0.012 * SPAN
+    ends = [((west, south), (east, south))]
+    ends += [((x, south - tick), (x, south + tick)) for x in (west, (west + east) / 2, east)]
+    return np.array([[(*a, 0.0), (*b, 0.0)] for a, b in ends]), length_m
+
+
+def compass() -> np.ndarray:
+    """An arrow to the north in the north-east of the surface, as segments (M, 2, 3), the first from tail to head."""
+    x, tail, head, wing = 0.69 * SPAN, 0.5 * SPAN, 0.62 * SPAN, 0.02 * SPAN
+    ends = [((x, tail), (x, head)), ((x - wing, head - 2 * wing), (x, head)), ((x + wing, head - 2 * wing), (x, head))]
+    return np.array([[(*a, 0.0), (*b, 0.0)] for a, b in ends])

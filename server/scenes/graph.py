@@ -72,7 +72,9 @@ def _graph(told: Mapping[str, Any], number: Mapping[str, int]) -> Graph:
     )
 
 
-def drawing(graph: Graph, moment_s: float, chart: Chart, depth: Callable[[int], float]) -> Drawing:
+def drawing(
+    graph: Graph, moment_s: float, chart: Chart, depth: Callable[[int], float], look: palette.Look = palette.LIGHT
+) -> Drawing:
     """The part of a graph that had happened at a moment; depth(subject) in metres."""
     begun = graph.time_s <= moment_s
     depths = np.array([depth(n) for n in range(int(graph.owner.max(initial=-1)) + 1)])
@@ -92,11 +94,11 @@ def drawing(graph: Graph, moment_s: float, chart: Chart, depth: Callable[[int], 
         lines.append(arcs(at, tied[tied[:, 2] > 0]))
         colours += [colour] * 4
         known = mine & np.isfinite(graph.cov[:, 0])
-        faint = palette.faded(colour, FAINT)
+        faint = look.faded(colour, FAINT)
         lines.append(ellipses(chart, graph.xy[known], graph.cov[known], float(depths[n])).reshape(-1, 2, 3))
         colours.append(faint)
         heard = graph.ranges[mine[graph.ranges[:, 0]] & begun[graph.ranges[:, 1]]]
-        for used, shade in ((True, faint), (False, palette.LOST)):
+        for used, shade in ((True, faint), (False, look.lost)):
             ends = heard[(heard[:, 2] == 1) == used]
             ranges.append(np.stack([at[ends[:, 0]], at[ends[:, 1]]], axis=1))
             range_colours.append(shade)

@@ -8,7 +8,7 @@ import json
 import logging
 import secrets
 from collections.abc import Awaitable, Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,14 +16,20 @@ import numpy as np
 from server import artifacts
 from server.jobs import Jobs
 from server.problems import Refusal
-from server.scenes import graph
+from server.scenes import ensemble, graph, palette
 from server.scenes.cameras import ABOVE, OBLIQUE, Cameras
 from server.scenes.footage import Footage, at, footage
 from server.scenes.geometry import Chart, chart
-from server.scenes.pane import Options, Pane
+from server.scenes.options import Options
+from server.scenes.pane import Pane
 from server.settings import Settings
 
 log = logging.getLogger(__name__)
+
+#: Cameras stay within this distance (scene units).
+FARTHEST = 500.0
+#: The pane that shows all algorithms laid over each other.
+OVERLAY = "overlay"
 
 BROKEN = "the 3D panes could not be drawn; the server's log says why"
 
@@ -75,7 +81,10 @@ class Session:
     def __init__(self, sessions: Sessions, send: Send) -> None:
         self._sessions, self._send = sessions, send
         self._panes: dict[str, tuple[str, Pane]] = {}
-        self._cameras = Cameras(asyncio.get_running_loop())
+        self._cameras = Cameras(asyncio.get_running_loop(), self._tell_camera)
+        self._telling: set[asyncio.Task[None]] = set()
+        self._job: str | None = None
+        self._ensembles: dict[str, ensemble.Ensemble] | None = None
         self._options = Options()
         self._footage: Footage | None = None
         self._chart: Chart | None = None
@@ -96,7 +105,9 @@ class Session:
             elif kind == "seek":
                 self._seek(float(message["time_s"]))
             elif kind == "options":
-                self._choose(message)
+                await self._choose({k: v for k, v in message.items() if k != "type"})
+            elif kind == "camera":
+                self._look([float(v) for v in message["pose"]])
             else:
                 raise ValueError(f"there are no messages of type {str(kind)[:40]!r}")
         except Refusal as refusal:
@@ -120,12 +131,12 @@ class Session:
         if len(names) > self._sessions.settings.panes_per_session:
             raise Refusal(422, "panes", f"at most {self._sessions.settings.panes_per_session} panes at once")
         for name in names:
-            if name not in found.algorithms:
+            if name not in found.algorithms and name != OVERLAY:
                 raise Refusal(422, "panes", f"{name!r} does not run in this job")
         if self._following is not None:
             self._following.cancel()
         async with self._drawing:
-            self._footage = self._chart = self._moment = None
+            self._footage = self._chart = self._moment = self._job = self._ensembles = None
             for name in [n for n in self._panes if n not in names]:
                 await self._drop(name)
             for name in names:
@@ -135,7 +146,7 @@ class Session:
                     self._cameras.join(pane)
         panes = {name: f"/scenes/{self._panes[name][0]}/" for name in names}
         await self._send({"type": "scenes", "panes": panes})
-        self._following = asyncio.create_task(self._follow(job, names))
+        self._following = asyncio.create_task(self._follow(job, found.algorithms))
 
     def _seek(self, time_s: float) -> None:
         if not np.isfinite(time_s):
@@ -143,24 +154,27 @@ class Session:
         self._moment = time_s
         self._stale.set()
 
-    def _choose(self, message: dict[str, Any]) -> None:
-        known = {f.name: f for f in fields(Options)}
-        chosen = {k: v for k, v in message.items() if k != "type"}
-        for key, value in chosen.items():
-            if key not in known:
-                raise ValueError(f"there is no option {key[:40]!r}; there are {', '.join(known)}")
-            if key == "hidden":
-                if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-                    raise ValueError("option hidden: a list of names is expected")
-                chosen[key] = tuple(value)
-                continue
-            named = known[key].default is None
-            if not isinstance(value, str | None if named else bool):
-                raise ValueError(f"option {key}: {'a name or null' if named else 'true or false'} is expected")
-        if chosen.get("top", self._options.top) != self._options.top:
-            self._cameras.move(ABOVE if chosen["top"] else OBLIQUE)
-        self._options = replace(self._options, **chosen)
+    async def _choose(self, values: dict[str, Any]) -> None:
+        before, self._options = self._options, self._options.chosen(values)
+        if self._options.top != before.top:
+            self._cameras.look(ABOVE if self._options.top else OBLIQUE)
+        self._cameras.link(self._options.linked)
+        if (self._options.depth, self._options.dark) != (before.depth, before.dark):
+            async with self._drawing:
+                if self._footage is not None:
+                    self._chart = self._charted(self._footage)
+                    await _undisturbed(self._stage_panes, self._footage, self._chart)
         self._stale.set()
+
+    def _look(self, pose: list[float]) -> None:
+        if len(pose) != 6 or not np.isfinite(pose).all() or np.abs(pose).max() > FARTHEST:
+            raise ValueError("pose is a position and a point to look at, six numbers")
+        self._cameras.look(np.array(pose))
+
+    def _tell_camera(self, pose: np.ndarray) -> None:
+        task = asyncio.ensure_future(self._send({"type": "camera", "pose": np.round(pose, 3).tolist()}))
+        self._telling.add(task)
+        task.add_done_callback(self._telling.discard)
 
     async def _drop(self, name: str) -> None:
         id, pane = self._panes.pop(name)
@@ -189,6 +203,7 @@ class Session:
                 assert text is not None, "a job that is done has a view"
                 view = json.loads(text)
                 graphs = await asyncio.to_thread(_graphs, jobs, job, view)
+                self._job = job
                 await self._stage(replace(footage(view, names), graphs=graphs))
         except Refusal as refusal:
             await self._send({"type": "error", "detail": refusal.detail})
@@ -201,8 +216,7 @@ class Session:
     async def _stage(self, new: Footage) -> None:
         """Take new footage; send what stands still unless the panes have it already."""
         async with self._drawing:
-            deepest = max((abs(s["depth_m"] or 0.0) for s in new.subjects), default=0.0)
-            wanted = self._chart if self._chart and new.truth else chart(new.points(), deepest)
+            wanted = self._chart if self._chart and new.truth else self._charted(new)
             if self._chart is None or wanted != self._chart:
                 self._chart = wanted
                 await _undisturbed(self._stage_panes, new, wanted)
@@ -212,9 +226,26 @@ class Session:
             self._footage = new
         self._stale.set()
 
+    def _charted(self, footage: Footage) -> Chart:
+        deepest = max((abs(s["depth_m"] or 0.0) for s in footage.subjects), default=0.0)
+        return chart(footage.points(), deepest, self._options.depth)
+
     def _stage_panes(self, new: Footage, where: Chart) -> None:
         for _, pane in self._panes.values():
-            pane.stage(new, where)
+            pane.stage(new, where, palette.DARK if self._options.dark else palette.LIGHT)
+
+    async def _gather(self) -> None:
+        """Read the trials of a finished job once they are to be shown."""
+        if self._ensembles is not None or self._job is None or not (self._options.cloud or self._options.contours):
+            return
+        assert self._footage is not None
+        shown = {s: (self._footage.time_s, track) for s, track in self._footage.truth.items()}
+        try:
+            path = self._sessions.jobs.artifact(self._job, artifacts.ARRAYS)
+            self._ensembles = await asyncio.to_thread(ensemble.read, path, list(self._footage.tracks), shown)
+        except Refusal as refusal:
+            self._ensembles = {}
+            await self._send({"type": "error", "detail": refusal.detail})
 
     async def _paint(self) -> None:
         while True:
@@ -224,6 +255,7 @@ class Session:
                 if self._footage is None:
                     continue
                 moment = self._footage.latest_s if self._moment is None else self._moment
+                await self._gather()
                 try:
                     await _undisturbed(self._show_panes, moment)
                 except Exception:
@@ -240,7 +272,7 @@ class Session:
         if name in self._footage.truth:
             place = at(self._footage.time_s, self._footage.truth[name], moment)
         elif name is not None and self._panes:
-            track = self._footage.tracks[next(iter(self._panes))]
+            track = self._footage.tracks[self._drawn(next(iter(self._panes)))[0]]
             place = at(track.time_s, track.mean[name], moment) if name in track.mean else None
         if place is None or not np.isfinite(place).all():
             self._followed = None
@@ -249,11 +281,19 @@ class Session:
         step = target - (self._cameras.pose[3:] if self._followed is None else self._followed)
         step[2], self._followed = 0.0, target
         if np.abs(step).max() > 1e-6:
-            self._cameras.move(self._cameras.pose + np.concatenate([step, step]))
+            self._cameras.shift(step)
+
+    def _drawn(self, pane: str) -> list[str]:
+        """The algorithms that a pane shows: its own, or those that colours are given for."""
+        assert self._footage is not None
+        if pane != OVERLAY:
+            return [pane]
+        return [name for name in self._footage.tracks if name in self._options.colours] or list(self._footage.tracks)
 
     def _show_panes(self, moment: float) -> None:
         for name, (_, pane) in self._panes.items():
-            pane.show(name, moment, self._options)
+            pane.ensembles = self._ensembles or {}
+            pane.show(self._drawn(name), moment, self._options)
 
 
 def _graphs(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, dict[str, graph.Graph]]:

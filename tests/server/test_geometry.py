@@ -8,7 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.scenes.footage import at
-from server.scenes.geometry import CORNERS, SPAN, Chart, chart, dashes, ellipses, round_length, segments
+from server.scenes.geometry import (
+    CORNERS,
+    SPAN,
+    Chart,
+    chart,
+    compass,
+    dashes,
+    ellipses,
+    radius,
+    round_length,
+    scale_bar,
+    segments,
+)
 
 UNIT = Chart(np.zeros(2), 1.0, 1.0)
 
@@ -22,6 +34,27 @@ def test_the_ellipse_is_the_95_percent_contour(sx: float, sy: float, rho: float)
     distance = np.einsum("ki,ij,kj->k", corners, np.linalg.inv(cov), corners)
     np.testing.assert_allclose(distance, 5.991464547107979, rtol=1e-6)
     assert drawn.shape == (1, CORNERS, 2, 3)
+
+
+@pytest.mark.parametrize("sigma", [1, 2, 3])
+def test_an_ellipse_of_some_sigmas_is_that_many_times_as_large(sigma: int):
+    ring = ellipses(UNIT, np.zeros((1, 2)), np.array([[4.0, 0.0, 4.0]]), 0.0, radius(sigma))
+    np.testing.assert_allclose(np.linalg.norm(ring[0, :, 0, :2], axis=-1), 2.0 * sigma)
+
+
+def test_the_scale_is_as_long_as_it_says_and_north_is_up():
+    where = chart(np.array([[0.0, 0.0], [730.0, 100.0]]), 0.0)
+    bar, length_m = scale_bar(where)
+    assert length_m == 100
+    assert np.ptp(bar[0, :, 0]) == pytest.approx(length_m * where.scale)
+    tail, head = compass()[0]
+    assert head[0] == tail[0] and head[1] > tail[1]
+
+
+def test_depths_are_stretched_as_asked():
+    points = np.array([[0.0, 0.0], [1000.0, 0.0]])
+    assert chart(points, 20.0, stretch=3.0).stretch == 3.0
+    assert chart(points, 20.0).stretch == pytest.approx(3.5)
 
 
 def test_an_ellipse_that_is_not_finite_is_left_out():

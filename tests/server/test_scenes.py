@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from server.scenes import relay
+from server.scenes import palette, relay
 from server.scenes.cameras import ABOVE, OBLIQUE
 from tests.server.living import PATIENCE_S, SHORT, Live, until
 
@@ -206,6 +208,11 @@ def test_two_sessions_share_nothing(live: Live, job: str):
         '{"type": "seek", "time_s": "x"}',
         '{"type": "options", "trails": 3}',
         '{"type": "options", "glitter": true}',
+        '{"type": "options", "sigma": 4}',
+        '{"type": "options", "depth": 1e9}',
+        '{"type": "options", "colours": {"cekf": [1, 2]}}',
+        '{"type": "camera", "pose": [1, 2, 3]}',
+        '{"type": "camera", "pose": [1, 2, 3, 4, 5, 1e300]}',
         "[" * 5000,
     ],
 )
@@ -245,3 +252,93 @@ def test_the_camera_goes_along_with_the_vehicle_followed_and_looks_from_above(li
             until(lambda: mine.hear("at")["time_s"] == 100.0, "the moment asked for")
             until(lambda: abs(client.camera.look_at[0]) > 0.1, "the vehicle in the middle")
             assert client.camera.position[0] == pytest.approx(client.camera.look_at[0])
+
+
+def pane_of(live: Live, path: str):
+    return live.app.state.site.scenes.panes[path.split("/")[2]].server
+
+
+#: Moments that are asked for once only.
+MOMENTS = itertools.count(100.0, 0.25)
+
+
+def drawn(live: Live, mine, path: str, node: str, **options):
+    """A node's points once the panes have been drawn with these options."""
+    moment = next(MOMENTS)
+    mine.say(type="options", **options)
+    mine.say(type="seek", time_s=moment)
+    until(lambda: mine.hear("at")["time_s"] == moment, "the moment asked for")
+    return pane_of(live, path).scene.get_handle_by_name(node).points
+
+
+def test_algorithms_are_laid_over_each_other_in_their_colours(live: Live, job: str):
+    with session(live) as mine:
+        path = mine.show(job, "overlay")["overlay"]
+        one = drawn(live, mine, path, "/present", colours={"cekf": [200, 0, 0]})
+        both = drawn(live, mine, path, "/present", colours={"cekf": [200, 0, 0], "nekf": [0, 0, 200]})
+        assert len(both) > 1.5 * len(one)
+        tints = pane_of(live, path).scene.get_handle_by_name("/present").colors.reshape(-1, 3)
+        assert {(147, 0, 0), (0, 0, 147)} <= {tuple(c) for c in tints.tolist()}
+
+
+def test_ellipses_have_the_size_asked_for(live: Live, job: str):
+    with session(live) as mine:
+        path = mine.show(job, "dead_reckoning")["dead_reckoning"]
+        width = {}
+        for sigma in (1, 3):
+            points = drawn(live, mine, path, "/present", sigma=sigma)
+            width[sigma] = float(np.ptp(points[:24, 0, 0]))
+        assert width[3] == pytest.approx(3 * width[1], rel=1e-3)
+
+
+def test_all_trials_are_a_cloud_with_its_envelope_and_densities(live: Live):
+    id = live.done(SHORT | {"trials": 40})["id"]
+    with session(live) as mine:
+        path = mine.show(id, "cekf")["cekf"]
+        assert len(drawn(live, mine, path, "/trials/cloud", cloud=True)) == 2 * 40
+        scene = pane_of(live, path).scene
+        assert len(scene.get_handle_by_name("/trials/envelope").points) > 24
+        assert len(drawn(live, mine, path, "/trials/density", contours=True)) > 24
+        assert len(drawn(live, mine, path, "/trials/cloud", cloud=False, contours=False)) == 1
+
+
+def test_depth_and_dark_water_are_staged_again(live: Live, job: str):
+    with session(live) as mine:
+        path = mine.show(job, "cekf")["cekf"]
+        drawn(live, mine, path, "/trails")
+        depth = {}
+        for stretch in (1.0, 4.0):
+            drawn(live, mine, path, "/trails", depth=stretch, dark=True)
+            depth[stretch] = float(pane_of(live, path).scene.get_handle_by_name("/vehicle/0").position[2])
+        assert depth[4.0] == pytest.approx(4 * depth[1.0])
+        grid = pane_of(live, path).scene.get_handle_by_name("/surface")
+        assert tuple(grid.cell_color) == palette.DARK.grid
+        assert "depths × 4" in pane_of(live, path).scene.get_handle_by_name("/bearings/scale").text
+
+
+def test_free_cameras_do_not_follow_and_a_camera_at_rest_is_told(live: Live, job: str):
+    with session(live) as mine:
+        panes = mine.show(job, "cekf", "nekf")
+        servers = [pane_of(live, p) for p in panes.values()]
+        mine.say(type="options", linked=False)
+        with viewer(live, panes["cekf"]) as one, viewer(live, panes["nekf"]) as other:
+            clients = []
+            for socket, server in ((one, servers[0]), (other, servers[1])):
+                socket.send(camera(position=(3.0, 3.0, 3.0)))
+                clients += until(lambda server=server: list(server.get_clients().values()), "the viewer")
+            start = OBLIQUE[:3].tolist()
+            for client in clients:
+                until(lambda client=client: client.camera.position.tolist() == start, "the common start")
+            for socket in (one, other):
+                socket.send(camera(position=tuple(start)))
+
+            def told() -> bool:
+                one.send(camera(position=(4.0, 5.0, 6.0)))
+                return mine.hear("camera")["pose"][:3] == [4.0, 5.0, 6.0]
+
+            until(told, "the camera's place")
+            assert clients[1].camera.position.tolist() == start
+            mine.say(type="options", linked=True)
+            until(lambda: clients[1].camera.position.tolist() == [4.0, 5.0, 6.0], "the other pane's camera")
+            mine.say(type="camera", pose=[1.0, 2.0, 9.0, 0.0, 0.0, 0.0])
+            until(lambda: clients[0].camera.position.tolist() == [1.0, 2.0, 9.0], "the place told by the page")
