@@ -94,7 +94,10 @@ def tracks(diary: Diary, water: Water, tracker: Tracker, packets: PacketCount, n
 
 
 def _figures(diary: Diary, h: int) -> dict[str, tuple[str, np.ndarray]]:
-    """Series over report times, NaN but at the report that follows an update, by key: title and (trials, T)."""
+    """Series over report times, NaN but at the report that follows an update, by key: title and (trials, T).
+
+    Behind the target is a fix by its distance from where the target has got to by the time it is made (C19 Table 3.1).
+    """
     time_s = diary.mission.time_s
     kind = np.stack([s.kind[:, h] for s in diary.slots], axis=1)
     end_s = np.array([s.end_s for s in diary.slots])
@@ -109,35 +112,32 @@ def _figures(diary: Diary, h: int) -> dict[str, tuple[str, np.ndarray]]:
             out[row, column[n]] = value[row, n]
         return out
 
-    found: dict[str, tuple[str, np.ndarray]] = {}
-    errors = {
-        "error_m": ("error at an update", diary.error_m),
-        "trailing_m": ("distance from the fix to where the target is by then", diary.trailing_m),
-        "fix_error_m": ("error of the fix for the time of the ping", diary.fix_m),
+    def at_updates(errors: list[np.ndarray], wanted: np.ndarray) -> np.ndarray:
+        return placed(np.stack([e[:, h] for e in errors], axis=1), wanted)
+
+    full, partial, any_kind = kind == Update.FULL, kind == Update.PARTIAL, kind != Update.NONE
+    delay = np.broadcast_to(end_s - ping_s, kind.shape)
+    found = {
+        "full_error_m": ("Full update: error", at_updates(diary.error_m, full)),
+        "full_trailing_m": ("Full update: fix behind target", at_updates(diary.trailing_m, full)),
+        "full_fix_error_m": ("Full update: error at the ping", at_updates(diary.fix_m, full)),
+        "full_delay_s": ("Full update: time since the ping", placed(delay, full)),
+        "partial_error_m": ("Partial update: error", at_updates(diary.error_m, partial)),
+        "partial_trailing_m": ("Partial update: fix behind target", at_updates(diary.trailing_m, partial)),
+        "first_delay_s": ("First update: time since the ping", placed(delay, _first_of_cycle(diary, kind))),
     }
-    duration, delay = time_s[-1], np.broadcast_to(end_s - ping_s, kind.shape)
-    for wanted, word in ((Update.FULL, "full"), (Update.PARTIAL, "partial")):
-        for key, (title, slots) in errors.items():
-            value = np.stack([v[:, h] for v in slots], axis=1)
-            found[f"{word}_{key}"] = (f"{word.capitalize()} information: {title}", placed(value, kind == wanted))
-        title = f"{word.capitalize()} information: time since the ping"
-        found[f"{word}_delay_s"] = (title, placed(delay, kind == wanted))
-    first = _first_of_cycle(diary, kind)
-    found["first_delay_s"] = ("Time from the ping to the first update", placed(delay, first))
-    trailing = np.stack([v[:, h] for v in diary.trailing_m], axis=1)
     length = np.hypot(*diary.mission.offsets.T).mean()
-    for word, low, high in (("early", 0.25, 0.5), ("late", 0.75, 1.0)):
-        within = (end_s > low * duration) & (end_s <= high * duration)
-        title = f"{word.capitalize()} in the mission: distance from the fix to where the target is by then"
-        found[f"{word}_trailing_m"] = (title, placed(trailing, (kind != Update.NONE) & within))
-        near = (trailing < length).astype(float)
-        title = f"{word.capitalize()} in the mission: share of fixes within a formation length of where the target is"
-        found[f"{word}_kept"] = (title, placed(near, (kind != Update.NONE) & within))
+    near = [np.where(np.isfinite(away), away < length, np.nan) for away in diary.trailing_m]
+    quarters = {"early": ("Second quarter", 0.25, 0.5), "late": ("Last quarter", 0.75, 1.0)}
+    for key, (when, low, high) in quarters.items():
+        within = any_kind & (end_s > low * time_s[-1]) & (end_s <= high * time_s[-1])
+        found[f"{key}_trailing_m"] = (f"{when}: fix behind target", at_updates(diary.trailing_m, within))
+        found[f"{key}_kept"] = (f"{when}: fixes within a formation length", at_updates(near, within))
     followed = responses(diary, h)
     if followed is not None:
         value = np.full((kind.shape[0], len(time_s)), np.nan)
         value[:, -1] = break_frequency(followed)
-        found["break_rps"] = ("Break of the transfer function from the target's turning to full fixes", value)
+        found["break_rps"] = ("Break of the transfer function", value)
     return found
 
 
