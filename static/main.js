@@ -8,6 +8,7 @@ import { mountMissions } from "./library/missions.js";
 import { mountPreview } from "./library/preview.js";
 import { part } from "./look/dom.js";
 import { mountNotices } from "./notices.js";
+import { mountSchedule } from "./pursuit/schedule.js";
 import { mountRooms } from "./rooms.js";
 import { mountRuns } from "./runs/runs.js";
 import { mountSide } from "./side.js";
@@ -54,6 +55,7 @@ const session = new SceneSession({
 });
 mountToolbar(session);
 mountTimeline();
+mountSchedule();
 mountPlots();
 mountBroadcasts();
 mountTable();
