@@ -11,6 +11,8 @@ const ROOMS = ["runs", "claims"];
 
 const kept = new Map();
 let writing = 0;
+/** The address as it was last followed or written; where it is another, somebody has just moved on to it. */
+let settled = "";
 
 /**
  * Keeps something of an open run in the address under a key: `write()` gives its text, or null for what is usual;
@@ -51,6 +53,7 @@ function parts() {
 }
 
 function follow() {
+  settled = location.hash;
   const wanted = parts();
   const run = wanted.get("run");
   const room = ROOMS.includes(wanted.get("room")) ? wanted.get("room") : "workbench";
@@ -81,9 +84,10 @@ function current() {
 
 /** Writes the address; another run or room is a new entry in the browser's history. */
 function put(hash) {
-  if (hash === location.hash) return;
+  if (hash === location.hash || location.hash !== settled) return;
   const place = (text) => ["room", "run"].map((key) => new URLSearchParams(text.slice(1)).get(key)).join();
   const address = location.pathname + location.search + hash;
   if (place(hash) === place(location.hash)) history.replaceState(null, "", address);
   else history.pushState(null, "", address);
+  settled = location.hash;
 }
