@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from server.scenes.graph import Graph
+from server.scenes.pursuit import Pursuit
 
 
 @dataclass
@@ -40,7 +41,7 @@ class Packet:
 @dataclass(frozen=True)
 class Footage:
     """A job's mission: report times, subjects, truth {S: (T, 2)} m of trial 0, packets by time of launch; and, of the
-    algorithms that keep them, factor graphs {algorithm: {subject: graph}}."""
+    algorithms that keep them, factor graphs {algorithm: {subject: graph}} and pursuits {algorithm: pursuit}."""
 
     time_s: np.ndarray
     subjects: list[dict[str, Any]]
@@ -48,6 +49,7 @@ class Footage:
     packets: list[Packet]
     tracks: dict[str, Track]
     graphs: dict[str, dict[str, Graph]] = field(default_factory=dict)
+    pursuits: dict[str, Pursuit] = field(default_factory=dict)
 
     @property
     def names(self) -> list[str]:

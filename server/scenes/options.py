@@ -13,10 +13,11 @@ Name = Annotated[str, Field(max_length=100)]
 class Options(BaseModel):
     """Lines and layers to draw, where to look from, and how.
 
-    sigma: size of the ellipses in standard deviations, or 95 for the 95 % region; follow, graph: a vehicle to keep in
-    the middle, and whose factor graph to draw; hidden: vehicles to leave out; colours: of each algorithm laid over
-    each other; depth: how much depths are stretched, 0 for as much as suits; linked: whether cameras move together;
-    cloud, contours: all trials at the moment, as points with their 90 % envelope, and as lines of equal density.
+    sigma: size of the ellipses in standard deviations, or 95 for the 95 % region; follow, graph, pursuit: a vehicle to
+    keep in the middle, whose factor graph to draw, and whose view of a pursuit; hidden: vehicles to leave out; colours:
+    of each algorithm laid over each other; depth: how much depths are stretched, 0 for as much as suits; linked:
+    whether cameras move together; cloud, contours: all trials at the moment, as points with their 90 % envelope, and as
+    lines of equal density.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
@@ -34,6 +35,7 @@ class Options(BaseModel):
     dark: bool = False
     hidden: Annotated[list[Name], Field(max_length=500)] = []
     graph: Name | None = None
+    pursuit: Name | None = None
     colours: Annotated[dict[Name, Annotated[list[Level], Field(min_length=3, max_length=3)]], Field(max_length=64)] = {}
 
     def chosen(self, values: dict[str, Any]) -> Options:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import rich
 
-from server.scenes import ensemble, graph, inner, palette
+from server.scenes import ensemble, graph, inner, palette, pursuit
 from server.scenes.ensemble import Ensemble
 from server.scenes.footage import Footage, at
 from server.scenes.geometry import SPAN, Chart, compass, dashes, ellipses, radius, round_length, scale_bar, segments
@@ -23,7 +23,7 @@ SMALLEST = 0.02
 #: A ray is seen for this share of the mission, and at least this long.
 RAY_SHARE, RAY_S = 0.006, 3.0
 #: Size of the points of a cloud (scene units), and where nothing is to be seen.
-POINT, AWAY = 0.05, -1000.0
+POINT, AWAY = 0.1, -1000.0
 
 FIELD_OF_VIEW = np.radians(50.0)
 
@@ -42,7 +42,7 @@ class Pane:
         self.ensembles: Mapping[str, Ensemble] = {}
         self._chart: Chart
         self._look = palette.LIGHT
-        self._graphed = self._clouded = False
+        self._graphed = self._clouded = self._pursued = False
         self._truth: Places = {}
         self._without: Sequence[str] | None = None
         self._staged = 0
@@ -111,7 +111,7 @@ class Pane:
         arrow = compass()
         self._lines("/bearings", [bar, arrow], [self._look.truth] * 2, 2.0)
         told = f"{length_m / 1000:g} km" if length_m >= 1000 else f"{length_m:g} m"
-        if self._chart.stretch > 1.05 and any(s["depth_m"] for s in self.footage.subjects):
+        if self._chart.stretch >= 1.2 and any(s["depth_m"] for s in self.footage.subjects):
             told += f", depths × {self._chart.stretch:.3g}"
         for name, text, place in (("scale", told, bar.mean(axis=(0, 1))), ("north", "N", arrow[0, 1])):
             self.server.scene.add_label(
@@ -160,6 +160,7 @@ class Pane:
             self._trials(moment_s, now, options)
             self._rays(moment_s, first, truth, options)
             self._graph(algorithms, moment_s, options.graph)
+            self._pursuit(algorithms, moment_s, options.pursuit, first, truth)
             self._place(first if len(algorithms) == 1 else first | truth, truth if len(algorithms) == 1 else {})
 
     def _colour(self, algorithm: str, n: int, now: Mapping[str, Places], options: Options) -> palette.Rgb:
@@ -228,7 +229,7 @@ class Pane:
                 here = found.at(name, moment_s)
                 if options.cloud:
                     points.append(self._chart.place(here, depth))
-                    tints.append(np.tile(np.array(self._look.faded(colour, 0.25), np.uint8), (len(here), 1)))
+                    tints.append(np.tile(np.array(colour, np.uint8), (len(here), 1)))
                     kept = thinned(len(found.time_s), ELLIPSES)
                     past = [t for t in found.time_s[kept] if t <= moment_s] if self._moves(name) else []
                     hulls = [h for t in [*past, moment_s] if (h := ensemble.envelope(found.at(name, t))) is not None]
@@ -280,6 +281,21 @@ class Pane:
         self._lines("/graph/ranges", drawn.ranges if drawn else [], drawn.range_colours if drawn else [], 1.0)
         self._lines("/graph/links", drawn.lines if drawn else [], drawn.colours if drawn else [], 1.5)
         self._points("/graph/poses", [drawn.dots] if drawn else [], [drawn.dot_colours] if drawn else [], graph.DOT)
+
+    def _pursuit(
+        self, algorithms: Sequence[str], moment_s: float, whose: str | None, now: Places, truth: Places
+    ) -> None:
+        """Formation, waypoints, messages and hyperbolas of a pursuit; nothing where there is none or it is off."""
+        found = self.footage.pursuits.get(algorithms[0]) if len(algorithms) == 1 and whose is not None else None
+        if found is None and not self._pursued:
+            return
+        self._pursued = found is not None
+        drawn = pursuit.Drawing([], [], [], [])
+        if found is not None:
+            target = next(iter(truth.values()), None)
+            drawn = pursuit.drawing(found, moment_s, self._chart, self._look, whose, now, target)
+        self._lines("/pursuit/lines", drawn.lines, drawn.colours, 2.2)
+        self._lines("/pursuit/thin", drawn.thin, drawn.thin_colours, 1.2)
 
     def _place(self, now: Places, truth: Places) -> None:
         for n, name in enumerate(self.footage.names):

@@ -16,7 +16,7 @@ import numpy as np
 from server import artifacts
 from server.jobs import Jobs
 from server.problems import Refusal
-from server.scenes import ensemble, graph, palette
+from server.scenes import ensemble, graph, palette, pursuit
 from server.scenes.cameras import ABOVE, OBLIQUE, Cameras
 from server.scenes.footage import Footage, at, footage
 from server.scenes.geometry import Chart, chart
@@ -203,8 +203,9 @@ class Session:
                 assert text is not None, "a job that is done has a view"
                 view = json.loads(text)
                 graphs = await asyncio.to_thread(_graphs, jobs, job, view)
+                pursuits = await asyncio.to_thread(_pursuits, jobs, job, view)
                 self._job = job
-                await self._stage(replace(footage(view, names), graphs=graphs))
+                await self._stage(replace(footage(view, names), graphs=graphs, pursuits=pursuits))
         except Refusal as refusal:
             await self._send({"type": "error", "detail": refusal.detail})
         except asyncio.CancelledError:
@@ -304,6 +305,19 @@ def _graphs(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, dict[str, g
         if told.get("graph"):
             path = jobs.artifact(job, artifacts.graph_file(algorithm))
             found[algorithm] = graph.read(json.loads(path.read_text(encoding="utf-8")), names)
+    return found
+
+
+def _pursuits(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, pursuit.Pursuit]:
+    """What the algorithms of a finished job tell of their schedules."""
+    names = [s["name"] for s in view["subjects"]]
+    found = {}
+    for algorithm, told in view["algorithms"].items():
+        if told.get("schedule"):
+            path = jobs.artifact(job, artifacts.graph_file(algorithm))
+            read = pursuit.read(json.loads(path.read_text(encoding="utf-8")), names)
+            if read is not None:
+                found[algorithm] = read
     return found
 
 

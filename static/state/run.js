@@ -148,7 +148,8 @@ async function viewSoFar(id, signal) {
 function take(view) {
   const names = view.subjects.map((s) => s.name);
   const estimated = new Set(Object.values(view.algorithms).flatMap((a) => Object.keys(a.subjects)));
-  const moving = view.subjects.find((s) => s.kind !== "fixed" && estimated.has(s.name));
+  const candidates = view.subjects.filter((s) => s.kind !== "fixed" && estimated.has(s.name));
+  const moving = candidates.find((s) => view.truth?.[s.name]) ?? candidates[0];
   const { vehicle } = store.state;
   const fits = names.includes(vehicle) && estimated.has(vehicle);
   store.set({ view, vehicle: fits ? vehicle : (moving?.name ?? names[0] ?? null) });
