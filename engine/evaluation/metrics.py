@@ -60,9 +60,10 @@ def evaluate(
     the mean over trials and times of the fourth root of the xy covariance's determinant, final_sigma_m its
     mean at the last time; sigma_growth its mean over the last quarter of the mission relative to the second, above
     one where uncertainty keeps growing; anees the mean over times of the NEES averaged over trials; max_deviation_m the
-    largest distance over trials and times between the mean and the benchmark's. A series of one subject becomes a
-    metric of the same name, its mean over trials and times, and NAME_interval, the 95 % interval of that mean over
-    trials. Undefined or infinite figures are None.
+    largest distance over trials and times between the mean and the benchmark's. error_median_m is the median over
+    trials of a trial's mean error, final_error_median_m that of the error at its last time with a reference. A series
+    of one subject becomes a metric of the same name, its mean over trials and times, with NAME_interval, the 95 %
+    interval of that mean over trials, and NAME_median, the median over trials. Undefined or infinite figures are None.
     """
     benchmark = results[centralized].beliefs if centralized is not None and centralized in results else {}
     return {
@@ -74,7 +75,7 @@ def evaluate(
     }
 
 
-def _growth(spread: np.ndarray) -> float | None:
+def growth(spread: np.ndarray) -> float | None:
     """Mean of a curve (T,) over its last quarter relative to its second; None for a curve too short or zero."""
     quarter = len(spread) // 4
     early = spread[quarter : 2 * quarter].mean() if quarter else 0.0
@@ -89,7 +90,7 @@ def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: 
     metrics = _error(truth, belief) | {
         "sigma_m": number(spread.mean()),
         "final_sigma_m": number(spread[:, -1].mean()),
-        "sigma_growth": _growth(spread.mean(axis=0)),
+        "sigma_growth": growth(spread.mean(axis=0)),
     }
     ranges = gate(tracks.innovations[subject]) if subject in tracks.innovations else None
 
@@ -110,7 +111,7 @@ def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: 
         "consistent": consistent,
         "verdict": name,
         "explanation": sentence,
-        "max_deviation_m": None if benchmark is None else number(_distance(belief.mean, benchmark.mean).max()),
+        "max_deviation_m": None if benchmark is None else number(distance(belief.mean, benchmark.mean).max()),
     }
     together = correlations(subject, tracks.series)
     if together:
@@ -123,6 +124,7 @@ def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: 
             known = curve.value[np.isfinite(curve.value)]
             metrics[what] = number(known.mean()) if known.size else None
             metrics[f"{what}_interval"] = _interval(curve.value)
+            metrics[f"{what}_median"] = _median(curve.value)
     return metrics
 
 
@@ -136,21 +138,35 @@ def _interval(value: np.ndarray) -> list[float | None] | None:
     return [number(mean.mean() - half), number(mean.mean() + half)]
 
 
+def _median(value: np.ndarray) -> float | None:
+    """The median over trials of the mean over times of what is known of (trials, T); None where nothing is."""
+    known = np.isfinite(value)
+    having = known.any(axis=1)
+    if not having.any():
+        return None
+    means = np.where(known, value, 0.0)[having].sum(axis=1) / known[having].sum(axis=1)
+    return number(np.median(means))
+
+
 def _error(truth: np.ndarray, belief: Belief) -> SubjectMetrics:
     known = np.flatnonzero(np.isfinite(truth).all(axis=-1).any(axis=0))
     if not known.size:
-        return {"rmse_m": None, "final_rmse_m": None}
+        return dict.fromkeys(("rmse_m", "final_rmse_m", "error_median_m", "final_error_median_m"))
     weight = np.isfinite(truth).all(axis=-1).sum(axis=0)[known].astype(float)
     square = _mean_square(truth, belief)[known]
+    off = distance(belief.mean, truth)
+    failed = not np.isfinite(square).all()
     return {
         "rmse_m": number(np.sqrt((square * weight).sum() / weight.sum())),
         "final_rmse_m": number(np.sqrt(square[-1])),
+        "error_median_m": None if failed else _median(off),
+        "final_error_median_m": None if failed else _median(off[:, known[-1:]]),
     }
 
 
 def _mean_square(truth: np.ndarray, belief: Belief) -> np.ndarray:
     """Squared error averaged over the trials with a reference, (T,) m^2; NaN where none has or one failed."""
-    square = _distance(belief.mean, truth) ** 2
+    square = distance(belief.mean, truth) ** 2
     known = np.broadcast_to(np.isfinite(truth).all(axis=-1), square.shape)
     if known.all():
         return square.mean(axis=0)
@@ -158,7 +174,8 @@ def _mean_square(truth: np.ndarray, belief: Belief) -> np.ndarray:
         return np.sum(square, axis=0, where=known) / known.sum(axis=0)
 
 
-def _distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Between positions (..., 2) m: (...,)."""
     with np.errstate(invalid="ignore"):
         difference = a - b
         return np.hypot(difference[..., 0], difference[..., 1])

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from engine.slam.densities import Kde, fit
-from engine.slam.log import SlamLog
+from engine.slam.log import SlamLog, thinned
 from engine.slam.mission import SlamMission
 from engine.slam.products import product
 from engine.slam.reckoning import reckon
@@ -17,6 +17,7 @@ from engine.slam.run import Moment, Options, over_trials
 def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
     """The product of all arrays' forward densities so far, after each array."""
     options = Options.model_validate(dict(mission.options.get("beamform_only", {})))
+    log = thinned(log, options.measurements)
     N = options.kernels
     rng = np.random.default_rng(np.random.SeedSequence([mission.scenario.seed, trial]))
     poses = reckon(log, N, rng)
@@ -28,8 +29,8 @@ def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
         densities.setdefault(a.beacon, []).append(fit(a.array.sample_beacon(elements, rng, strata)))
         beacons[a.beacon] = product(densities[a.beacon], N, rng)
         end = n == len(log.arrays)
-        notes = tuple(f"array from pose {b.poses[0]}: {c}" for b in log.arrays for c in b.cautions) if end else ()
-        yield Moment(a.poses[-1], dict(beacons), n / len(log.arrays), poses if end else None, notes)
+        last, cautions = (poses, log.cautions) if end else (None, {})
+        yield Moment(a.poses[-1], dict(beacons), n / len(log.arrays), last, cautions=cautions)
 
 
 run = over_trials(solve)

@@ -19,6 +19,8 @@ from engine.slam.variables import DYN_POINT2, POINT2, POSE2, Kind
 
 #: Chance that a record's range is of nothing that was sent, and the range error that its density does not know of, m.
 DOUBT, BENT_M = 0.05, 0.3
+#: How far the distance of a pose that heard the beacon may still be off, m.
+RANGED_M = 1.0
 #: Prior of a velocity, and how far it may change within a second, m/s.
 VELOCITY_SIGMA_MPS, CHANGE_MPS = 2.0, 0.5
 #: Ranges added at a time at first, and what share of those there are later: beliefs come early, and are not all lost.
@@ -129,8 +131,9 @@ def _events(log: SlamLog, plan: Plan, slack: np.ndarray, outlier_share: float) -
             off = float(slack[list(a.poses)].max())
             found.append((a.poses[-1], synthetic_aperture(poses, a.beacon, a.array, max(off, relative), relative)))
     else:
-        for p in log.pings:
-            factor = heard(name(p.pose), p.beacon, p.ranges_m, p.density, slack[p.pose], DOUBT, BENT_M)
+        for before, p in zip((None, *log.pings), log.pings):
+            off = slack[p.pose] if before is None else _since(log, slack, before.pose, p.pose)
+            factor = heard(name(p.pose), p.beacon, p.ranges_m, p.density, off, DOUBT, BENT_M)
             found.append((p.pose, factor))
         for r in log.readings:
             factor = reading(name(r.pose), r.beacon, r.range_m, r.sigma_m, slack[r.pose], outlier_share)
@@ -143,6 +146,12 @@ def _events(log: SlamLog, plan: Plan, slack: np.ndarray, outlier_share: float) -
         groups.append(found[done : done + at_once])
         done += at_once
     return [(group[-1][0], [factor for _, factor in group]) for group in groups]
+
+
+def _since(log: SlamLog, slack: np.ndarray, heard: int, now: int) -> float:
+    """How far (m) a pose's distance may be off where an earlier ping has told that of another: what odometry added."""
+    steps = float(log.step_cov[heard:now, :2, :2].trace(axis1=1, axis2=2).sum()) / 2
+    return min(float(slack[now]), float(np.hypot(np.sqrt(steps), RANGED_M)))
 
 
 def _slack(log: SlamLog, plan: Plan) -> np.ndarray:

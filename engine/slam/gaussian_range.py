@@ -14,7 +14,7 @@ from engine.slam.factors.heard import Heard
 from engine.slam.factors.prior import prior
 from engine.slam.factors.range import Range, ranging
 from engine.slam.graph import Graph
-from engine.slam.log import SlamLog
+from engine.slam.log import SlamLog, thinned
 from engine.slam.mission import SlamMission
 from engine.slam.propagation import Points, Propagation, down
 from engine.slam.run import Moment, Options, over_trials
@@ -31,6 +31,7 @@ PLAN = Plan("ranges")
 def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
     """A batch solution after each group of ranges, each begun where the last one ended."""
     options = Options.model_validate(dict(mission.options.get("gaussian_range", {})))
+    log = thinned(log, options.measurements)
     rng = np.random.default_rng(np.random.SeedSequence([mission.scenario.seed, trial]))
     graph, points = Graph(), Points()
     everything = list(growths(log, PLAN, mission.time_s, mission.scenario.outlier_share))

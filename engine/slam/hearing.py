@@ -12,7 +12,7 @@ from engine.acoustics.range_density import amplitude_density, range_density
 from engine.acoustics.sonar import Sonar, linear_chirp
 from engine.acoustics.synthetic_array import synthesize
 from engine.scenario.slam import SlamScenario, SonarSettings, array_starts
-from engine.slam.log import Aperture, Ping
+from engine.slam.log import Aperture, Ping, evenly
 
 
 def sonar_of(settings: SonarSettings) -> Sonar:
@@ -26,13 +26,6 @@ def sonar_of(settings: SonarSettings) -> Sonar:
         settings.record_samples,
         settings.sound_speed_mps,
     )
-
-
-def evenly(count: int, poses: int) -> list[int]:
-    """Numbers of `count` poses from the first to the last, evenly spread."""
-    if count <= 1:
-        return [0][:count]
-    return [round(k * (poses - 1) / (count - 1)) for k in range(count)]
 
 
 def hear(

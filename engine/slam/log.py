@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from engine.acoustics.synthetic_array import SyntheticArray
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,3 +71,24 @@ class SlamLog:
     def poses(self) -> int:
         """Number of poses P."""
         return len(self.steps) + 1
+
+    @property
+    def cautions(self) -> dict[int, tuple[str, ...]]:
+        """What speaks against each array, by its first pose."""
+        return {a.poses[0]: a.cautions for a in self.arrays}
+
+
+def evenly(count: int, total: int) -> list[int]:
+    """`count` numbers of `total`, from the first to the last, evenly spread."""
+    if count <= 1:
+        return [0][:count]
+    return [round(k * (total - 1) / (count - 1)) for k in range(count)]
+
+
+def thinned(log: SlamLog, count: int | None) -> SlamLog:
+    """A log with at most `count` of the pings, arrays and readings each, evenly spread; without a count, all."""
+
+    def some(items: tuple[T, ...]) -> tuple[T, ...]:
+        return items if count is None or count >= len(items) else tuple(items[k] for k in evenly(count, len(items)))
+
+    return replace(log, pings=some(log.pings), arrays=some(log.arrays), readings=some(log.readings))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from engine.registry import Progress
 from engine.slam.building import Plan, growths, name
 from engine.slam.densities import fit, from_gaussian
-from engine.slam.log import SlamLog
+from engine.slam.log import SlamLog, thinned
 from engine.slam.mission import SlamMission
 from engine.slam.solver import Solver
 from engine.tracks import Belief, Samples, Series, Tracks
@@ -28,18 +28,26 @@ class Options(BaseModel):
     model_config = ConfigDict(extra="forbid")
     kernels: int = Field(100, ge=20, le=5000, description="kernels of each belief")
     sweeps: int = Field(3, ge=1, le=100, description="moves of the kernels after each extension")
+    measurements: int | None = Field(
+        None, ge=1, le=5000, description="ranges or arrays used, evenly spread over those of the mission (none: all)"
+    )
     lag: int | None = Field(None, ge=20, le=5000, description="poses kept; older ones are marginalized (none: all)")
 
 
 @dataclass(frozen=True)
 class Moment:
-    """Beliefs of the beacons, each (N, 2), once a pose was reached; `last` holds all poses (P, N, 2) in the end."""
+    """Beliefs of the beacons, each (N, 2), once a pose was reached; `last` holds all poses (P, N, 2) in the end.
+
+    Then there are also the sum of squared residuals with its degrees of freedom, where the solver knows them, and
+    what speaks against each array, by its first pose.
+    """
 
     pose: int
     beacons: dict[str, np.ndarray]
     done: float
     last: np.ndarray | None = None
-    notes: tuple[str, ...] = ()
+    misfit: tuple[float, int] | None = None
+    cautions: dict[int, tuple[str, ...]] = field(default_factory=dict)
 
 
 #: From a trial's log, its mission and its number to the moments of its solution.
@@ -51,6 +59,7 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
 
     def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
         options = Options.model_validate(dict(mission.options.get(algorithm, {})))
+        log = thinned(log, options.measurements)
         seed = np.random.SeedSequence([mission.scenario.seed, trial])
         solver = Solver(options.kernels, seed, options.sweeps, options.lag)
         total = max(len(log.arrays) if plan.measurements == "arrays" else len(log.pings) + len(log.readings), 1)
@@ -65,26 +74,30 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
                 continue
             beliefs = solver.beliefs()
             poses = np.stack([beliefs[name(k)][:, :2] for k in range(log.poses)])
-            yield Moment(growth.pose, {b: beliefs[b] for b in solver.beacons}, 1.0, poses, _doubts(log, plan, solver))
+            places = {b: beliefs[b] for b in solver.beacons}
+            cautions = log.cautions if plan.measurements == "arrays" else {}
+            yield Moment(growth.pose, places, 1.0, poses, solver.misfit(), cautions)
 
     return over_trials(solve)
 
 
-def _doubts(log: SlamLog, plan: Plan, solver: Solver) -> tuple[str, ...]:
+def _doubts(ends: list[Moment]) -> list[str]:
+    """What the trials' last moments say against the answer, each kind once."""
     notes = []
-    if plan.measurements == "arrays":
-        doubtful = [a for a in log.arrays if a.cautions]
-        if doubtful:
-            first = doubtful[0]
-            where = f"{len(doubtful)} of {len(log.arrays)} arrays, such as the one from pose {first.poses[0]}"
-            notes.append(f"{where}: {'; '.join(first.cautions)}")
-    squares, freedom = solver.misfit()
-    if freedom > 0 and chi2.sf(squares, freedom) < UNLIKELY:
+    arrays = [(pose, said) for end in ends for pose, said in end.cautions.items()]
+    doubtful = [(pose, said) for pose, said in arrays if said]
+    if doubtful:
+        pose, said = doubtful[0]
+        notes.append(f"{len(doubtful)} of {len(arrays)} arrays, such as the one from pose {pose}: {'; '.join(said)}")
+    known = [end.misfit for end in ends if end.misfit is not None]
+    unlikely = [m for m in known if m[1] > 0 and chi2.sf(*m) < UNLIKELY]
+    if unlikely:
+        squares, freedom = max(unlikely, key=lambda m: m[0] / m[1])
         notes.append(
-            f"residuals do not fit the model: their squares sum to {squares:.0f} where about {freedom} was expected; "
-            "is a clock, the sound speed or a noise wrong?"
+            f"residuals do not fit the model in {len(unlikely)} of {len(known)} trials: their squares sum to "
+            f"{squares:.0f} where about {freedom} was expected; is a clock, the sound speed or a noise wrong?"
         )
-    return tuple(notes)
+    return notes
 
 
 def over_trials(solve: Solve) -> Callable[[SlamMission, Progress], Tracks]:
@@ -150,7 +163,7 @@ def _tracks(mission: SlamMission, histories: list[list[Moment]]) -> Tracks:
         mean, cov = _moments(points)
         beliefs[beacon] = Belief(mean[:, held], cov[:, held])
         series |= _curves(mission, beacon, points, held)
-    notes = tuple(dict.fromkeys(note for h in histories for note in h[-1].notes))
+    notes = _doubts([h[-1] for h in histories])
     return Tracks(beliefs, samples=samples, series=series, notes=(*mission.notes, *notes))
 
 

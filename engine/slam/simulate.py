@@ -10,8 +10,8 @@ from engine.acoustics.propagation import Wall, Water, record
 from engine.mission.routes import route
 from engine.mission.streams import stream
 from engine.scenario.slam import SlamScenario, WaterSettings
-from engine.slam.hearing import evenly, hear, sonar_of
-from engine.slam.log import SlamLog
+from engine.slam.hearing import hear, sonar_of
+from engine.slam.log import SlamLog, evenly
 
 #: Records processed at once, to bound memory.
 CHUNK = 128

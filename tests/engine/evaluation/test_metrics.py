@@ -63,6 +63,17 @@ def test_the_final_error_is_taken_where_the_reference_ends():
     assert found["final_sigma_m"] == pytest.approx(3)
 
 
+def test_medians_are_over_trials_of_what_each_is_off_on_average_and_in_the_end():
+    away = np.array([[0.0, 1.0, 2.0], [3.0, 3.0, 6.0], [10.0, 100.0, 40.0]])
+    mean = TRUTH + np.stack([away, 0 * away], axis=-1)
+    series = Series("", "m", np.where(away > 1.5, away, np.nan), ("iver",))
+    tracks = Tracks({"iver": Belief(mean, np.tile(np.eye(2), (3, 3, 1, 1)))}, series={"lag_m/iver": series})
+    found = scores(TRUTH, tracks)
+    assert found["error_median_m"] == pytest.approx(4.0)
+    assert found["final_error_median_m"] == pytest.approx(6.0)
+    assert found["lag_m_median"] == pytest.approx(4.0)
+
+
 @pytest.mark.parametrize("truth", [None, np.full((1, 3, 2), np.nan)])
 def test_without_a_reference_only_what_needs_none_is_reported(truth):
     found = scores(truth, Tracks({"iver": BELIEF}))

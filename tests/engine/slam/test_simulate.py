@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.slam.hearing import evenly
+from engine.slam.log import evenly
 from engine.slam.mission import fly, outline
 from engine.slam.simulate import listen, records
 from tests.engine.slam.missions import scenario
