@@ -31,6 +31,8 @@ from engine.tracks import Reference, Tracks, stack, stack_references
 BLOCK = 50
 #: The first block is small, so that a watcher sees the first estimates soon.
 FIRST = 5
+#: A run that keeps the tracks of more trials fills the memory; of more, statistics alone are kept.
+MOST_WHOLE = 100_000
 
 
 @dataclass(frozen=True)
@@ -160,8 +162,12 @@ def run(
     """Run a scenario on this machine's processes and put the result together.
 
     progress is told the fraction done. The result is the same for any number of workers (None: one per core).
+    Raises ScenarioError for more trials than can be kept whole.
     """
     names = chosen(scenario, algorithms)
+    if scenario.trials > MOST_WHOLE:
+        found = f"the tracks of {scenario.trials} trials are too many to keep"
+        raise ScenarioError([Problem("trials", found, f"ask for at most {MOST_WHOLE}, or keep statistics alone")])
     parts = blocks(scenario.trials)
     workers = min(workers or os.cpu_count() or 1, len(parts))
     told = [0.0] * len(parts)

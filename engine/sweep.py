@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from engine import runner
-from engine.evaluation.result import Result
 from engine.scenario import toml
 from engine.scenario.errors import Problem, ScenarioError
 from engine.scenario.models import ScenarioBase
+
+T = TypeVar("T")
 
 MOST_POINTS = 200
 
@@ -57,12 +58,13 @@ def run(
     *,
     workers: int | None = None,
     progress: Callable[[float], None] = lambda _fraction: None,
-) -> Iterator[tuple[float, Result]]:
-    """Each value with its result, in order, as it is finished."""
+    how: Callable[..., T] = runner.run,
+) -> Iterator[tuple[float, T]]:
+    """Each value with its result, in order, as it is finished; `how` is what runs one, or keeps its statistics."""
     at = points(scenario, sweep)
     for n, (value, point) in enumerate(zip(sweep.values, at)):
         told = lambda fraction, n=n: progress((n + fraction) / len(at))  # noqa: E731
-        yield value, runner.run(point, algorithms, workers=workers, progress=told)
+        yield value, how(point, algorithms, workers=workers, progress=told)
 
 
 def summary(key: str, results: Sequence[tuple[float, dict[str, Any]]]) -> dict[str, Any]:

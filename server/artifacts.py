@@ -8,7 +8,7 @@ import os
 import platform
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from importlib import metadata
 from pathlib import Path
 from typing import IO, Any
@@ -16,7 +16,9 @@ from typing import IO, Any
 import numpy as np
 
 from engine.evaluation.result import Result
+from engine.evaluation.summary import Spread, Summary
 from engine.runner import Shard
+from engine.statistics import Total, Totals
 from engine.tracks import Belief, Innovations, PacketCount, Reference, Samples, Series, Tracks
 from server.wire import dumps, plain
 
@@ -109,6 +111,53 @@ def write_result(directory: Path, result: Result) -> None:
         if tracks.graph:
             write_text(directory / graph_file(name), dumps(tracks.graph))
     write_json(directory / RESULT, result.to_json())
+
+
+def write_statistics(directory: Path, told: dict[str, Any]) -> None:
+    """Write result.json of a run of which only statistics were kept, and what computed it."""
+    directory.mkdir(parents=True, exist_ok=True)
+    write_json(directory / VERSIONS, versions())
+    write_json(directory / RESULT, told)
+
+
+def write_totals(path: Path, totals: Totals) -> str:
+    """Write what a batch of trials left; the file's checksum."""
+    arrays: dict[str, np.ndarray] = {}
+    meta = []
+    for n, (name, total) in enumerate(totals.items()):
+        rest = {"packets": asdict(total.packets), "notes": list(total.notes), "cpu_s": total.cpu_s}
+        meta.append(rest | {"name": name, "subjects": list(total.summaries)})
+        for k, summary in enumerate(total.summaries.values()):
+            for key, value in vars(summary).items():
+                parts = vars(value) if isinstance(value, Spread) else {"": value}
+                arrays |= {f"{n}/{k}/{key}/{part}": np.asarray(inside) for part, inside in parts.items()}
+    arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), dtype=np.uint8)
+    return write_arrays(path, arrays)
+
+
+def read_totals(path: Path) -> Totals:
+    """Read what `write_totals` wrote."""
+    with np.load(path, allow_pickle=False) as file:
+        arrays = {key: file[key] for key in file.files}
+
+    def value(place: str) -> Any:
+        if f"{place}/" in arrays:
+            return _plain(arrays[f"{place}/"])
+        return Spread(**{key.rsplit("/", 1)[1]: _plain(v) for key, v in arrays.items() if key.startswith(f"{place}/")})
+
+    totals = {}
+    for n, rest in enumerate(json.loads(arrays["meta"].tobytes())):
+        summaries = {
+            subject: Summary(**{f.name: value(f"{n}/{k}/{f.name}") for f in fields(Summary)})
+            for k, subject in enumerate(rest["subjects"])
+        }
+        packets = PacketCount(**rest["packets"])
+        totals[rest["name"]] = Total(summaries, packets, tuple(rest["notes"]), rest["cpu_s"])
+    return totals
+
+
+def _plain(value: np.ndarray) -> Any:
+    return value if value.ndim else value.item()
 
 
 def write_shard(path: Path, shard: Shard, reference: Reference, tracks: Tracks) -> str:

@@ -48,6 +48,9 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--sweep", metavar="KEY=A:B:STEP", help="run once for each value of a key, as network.loss=0:0.9:0.1"
     )
+    run.add_argument(
+        "--statistics", action="store_true", help="keep no tracks, only figures over trials: up to a million of them"
+    )
     run.add_argument("--workers", type=_count, metavar="N", help="processes to use (default: one per core)")
     run.set_defaults(run=commands.run)
 

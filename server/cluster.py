@@ -15,10 +15,9 @@ from distributed import Client, KilledWorker, LocalCluster
 from distributed.comm.core import CommClosedError
 from distributed.security import Security
 
-from engine.tracks import Reference, Tracks
 from server import work
 from server.settings import Settings
-from server.work import Piece
+from server.work import Answer, Piece
 
 log = logging.getLogger(__name__)
 
@@ -190,7 +189,7 @@ class Cluster:
         """Addresses of the workers there are now."""
         return sorted(self.threads)
 
-    async def run(self, piece: Piece, key: str, worker: str) -> tuple[Reference, Tracks]:
+    async def run(self, piece: Piece, key: str, worker: str) -> Answer:
         """Run a piece on a worker under a key of its own. Raises WorkerDied, ClusterLost, and what the piece raised."""
         if self._client is None or worker not in self.threads:
             raise ClusterLost("the worker left")

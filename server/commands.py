@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
-from engine import registry, runner, sweep
+from engine import registry, runner, statistics, sweep
 from engine.evaluation import comparison
 from engine.evaluation.result import Result
 from engine.scenario import library, toml
@@ -74,25 +74,22 @@ def _settings(chosen: Namespace, **others: Any) -> Settings:
 
 def run(chosen: Namespace) -> int:
     """Run a scenario, print the comparison, write the result directory where one is named."""
-    from server import artifacts
-
     scenario = _wanted(chosen)
     runner.chosen(scenario, chosen.algorithms)
     if chosen.out is not None and chosen.out.exists() and not chosen.out.is_dir():
         raise Usage(f"--out {chosen.out} is a file; name a folder")
     if chosen.sweep is not None:
         return _sweep(scenario, chosen)
-    result = _run(scenario, chosen.algorithms, chosen.workers)
-    print(f"{scenario.title} ({result.trials} trial{'s' * (result.trials != 1)}, seed {result.seed})")
-    told = result.to_json()
+    told, write = _outcome(scenario, chosen)
+    print(f"{scenario.title} ({told['trials']} trial{'s' * (told['trials'] != 1)}, seed {told['seed']})")
     print("\n".join(table.lines(*table.figures(told))))
     for name, answer in told["algorithms"].items():
         for note in answer["notes"]:
             print(f"note: {name}: {note}")
-    for claim in result.claims:
+    for claim in told["claims"]:
         print(_claim(claim))
     if chosen.out is not None:
-        artifacts.write_result(chosen.out, result)
+        write(chosen.out)
         print(f"written to {chosen.out}", file=sys.stderr)
     return 0
 
@@ -231,12 +228,21 @@ def _sweep(scenario: ScenarioBase, chosen: Namespace) -> int:
     results = []
     with _bar() as bar:
         for value, result in sweep.run(
-            scenario, wanted, chosen.algorithms, workers=chosen.workers, progress=lambda f: _fill(bar, f)
+            scenario,
+            wanted,
+            chosen.algorithms,
+            workers=chosen.workers,
+            progress=lambda f: _fill(bar, f),
+            how=statistics.run if chosen.statistics else runner.run,
         ):
-            told = result.to_json()
+            told = result.to_json() if isinstance(result, Result) else result
             results.append((value, told))
             if chosen.out is not None:
-                artifacts.write_result(chosen.out / f"{wanted.key}={value:g}", result)
+                folder = chosen.out / f"{wanted.key}={value:g}"
+                if isinstance(result, Result):
+                    artifacts.write_result(folder, result)
+                else:
+                    artifacts.write_statistics(folder, result)
         _fill(bar, 1.0)
     print(f"{scenario.title}: {wanted.key} ({scenario.trials} trials each, seed {scenario.seed})")
     print("\n".join(table.lines(*table.curves(wanted.key, results), left=3)))
@@ -252,6 +258,19 @@ def _run(scenario: ScenarioBase, algorithms: Sequence[str] | None, workers: int 
         result = runner.run(scenario, algorithms, workers=workers, progress=lambda f: _fill(bar, f))
         _fill(bar, 1.0)
     return result
+
+
+def _outcome(scenario: ScenarioBase, chosen: Namespace) -> tuple[dict[str, Any], Callable[[Path], None]]:
+    """What result.json is to hold, and a function that writes the result directory."""
+    from server import artifacts
+
+    if not chosen.statistics:
+        result = _run(scenario, chosen.algorithms, chosen.workers)
+        return result.to_json(), lambda folder: artifacts.write_result(folder, result)
+    with _bar() as bar:
+        told = statistics.run(scenario, chosen.algorithms, workers=chosen.workers, progress=lambda f: _fill(bar, f))
+        _fill(bar, 1.0)
+    return told, lambda folder: artifacts.write_statistics(folder, told)
 
 
 def _bar() -> tqdm:

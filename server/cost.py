@@ -9,7 +9,7 @@ from typing import Any
 
 from distributed.system import MEMORY_LIMIT
 
-from engine import runner
+from engine import runner, statistics
 from engine.scenario.errors import Problem
 from engine.scenario.models import ScenarioBase
 from server.settings import Settings
@@ -43,7 +43,7 @@ class Cost:
     worker_bytes: float
 
 
-def estimate(scenario: ScenarioBase, names: Sequence[str], rates: Mapping[str, float]) -> Cost:
+def estimate(scenario: ScenarioBase, names: Sequence[str], rates: Mapping[str, float], keep: str = "tracks") -> Cost:
     """The cost of running algorithms on a scenario; rates {algorithm: worker seconds per unit of work} seen before."""
     subjects = max(len(getattr(scenario, "vehicles", ())), 1)
     duration_s = scenario.duration_s or USUAL_S
@@ -51,23 +51,26 @@ def estimate(scenario: ScenarioBase, names: Sequence[str], rates: Mapping[str, f
     times = math.floor(duration_s / interval_s) + 1 if scenario.duration_s and interval_s else USUAL_TIMES
     each = scenario.trials * subjects * duration_s
     block = min(scenario.trials, runner.BLOCK)
+    whole = scenario if keep == "tracks" else statistics.shown(scenario)
+    batches = [] if keep == "tracks" else statistics.batches(scenario, names)
     return Cost(
         trials=scenario.trials,
         subjects=subjects,
         duration_s=duration_s,
-        shards=len(runner.blocks(scenario.trials)) * len(names),
+        shards=len(runner.blocks(whole.trials)) * len(names) + len(batches),
         work=each * len(names),
         worker_s=sum(each * rates.get(name, USUAL_RATE) for name in names),
-        result_bytes=scenario.trials * subjects * times * RESULT_BYTES * len(names),
+        result_bytes=whole.trials * subjects * times * RESULT_BYTES * len(names),
         worker_bytes=PROCESS_BYTES + block * subjects * duration_s * BYTES,
     )
 
 
-def problems(cost: Cost, settings: Settings) -> list[Problem]:
+def problems(cost: Cost, settings: Settings, keep: str = "tracks") -> list[Problem]:
     """What is too much of a job, each with what would be accepted."""
     found = []
-    if cost.trials > settings.most_trials:
-        found.append(_problem(f"{cost.trials} trials are too many for one job", settings.most_trials))
+    most = settings.most_trials if keep == "tracks" else settings.most_trials_summed
+    if cost.trials > most:
+        found.append(_problem(f"{cost.trials} trials are too many for one job that keeps {keep}", most))
     if cost.work > settings.most_work:
         many = f"{cost.trials} trials of {cost.subjects} vehicles over {cost.duration_s:g} s are too much for one job"
         found.append(_problem(many, math.floor(cost.trials * settings.most_work / cost.work)))
@@ -91,9 +94,9 @@ def worker_memory(settings: Settings) -> float | None:
     return settings.worker_memory or MEMORY_LIMIT / settings.workers
 
 
-def told(cost: Cost, settings: Settings, threads: int, queued: int) -> dict[str, Any]:
+def told(cost: Cost, settings: Settings, threads: int, queued: int, keep: str = "tracks") -> dict[str, Any]:
     """An estimate as REST tells it: with `threads` workers and `queued` jobs before it."""
-    found = problems(cost, settings)
+    found = problems(cost, settings, keep)
     return {
         "trials": cost.trials,
         "subjects": cost.subjects,

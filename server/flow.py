@@ -10,9 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from engine.tracks import Reference, Tracks
 from server.cluster import Cluster, ClusterLost, WorkerDied
-from server.work import Piece
+from server.work import Answer, Piece
 
 #: Of so many turns while urgent lines wait, one goes to the others.
 URGENT_RUN = 5
@@ -38,7 +37,7 @@ class Line(Protocol):
         """The piece to run next, on that worker."""
         ...
 
-    async def finish(self, piece: Piece, answer: tuple[Reference, Tracks], seconds: float) -> None:
+    async def finish(self, piece: Piece, answer: Answer, seconds: float) -> None:
         """Take in the answer."""
         ...
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hashlib
+import itertools
 import json
 import logging
 import math
@@ -17,10 +18,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
-from engine import runner
+from engine import runner, statistics
 from engine.scenario import toml
 from engine.scenario.errors import ScenarioError
 from engine.scenario.models import ScenarioBase
+from engine.statistics import Batch
 from server import artifacts, cost, logs, view, work
 from server.cluster import Cluster
 from server.flow import Flow
@@ -78,6 +80,7 @@ class Wanted:
     client: str = ""
     purpose: str = "run"
     limit_s: float | None = None
+    keep: str = "tracks"
 
 
 class Jobs:
@@ -118,11 +121,11 @@ class Jobs:
             found = f"{len(self._clients)} jobs" if len(self._clients) >= most else f"{mine} jobs of yours"
             raise Refusal(429, "busy", f"{found} are waiting already; try again later", headers={"retry-after": "10"})
 
-    def estimate(self, scenario: ScenarioBase, algorithms: list[str] | None) -> dict[str, Any]:
+    def estimate(self, scenario: ScenarioBase, algorithms: list[str] | None, keep: str = "tracks") -> dict[str, Any]:
         """What a job would cost, and whether it would be accepted; ScenarioError for what cannot run."""
         names = runner.chosen(scenario, algorithms)
-        found = cost.estimate(scenario, names, self.store.rates(scenario.family))
-        return cost.told(found, self._settings, sum(self._cluster.threads.values()), len(self._tasks))
+        found = cost.estimate(scenario, names, self.store.rates(scenario.family), keep)
+        return cost.told(found, self._settings, sum(self._cluster.threads.values()), len(self._tasks), keep)
 
     async def submit(self, wanted: Wanted) -> Job:
         """Accept a job, or find the one accepted before under the same idempotency key.
@@ -136,8 +139,9 @@ class Jobs:
         known = await asyncio.to_thread(self.store.keyed, wanted.key) if wanted.key is not None else None
         if known is not None:
             return _same(known, digest)
-        price = cost.estimate(scenario, names, await asyncio.to_thread(self.store.rates, scenario.family))
-        problems = cost.problems(price, self._settings)
+        rates = await asyncio.to_thread(self.store.rates, scenario.family)
+        price = cost.estimate(scenario, names, rates, wanted.keep)
+        problems = cost.problems(price, self._settings, wanted.keep)
         if problems:
             raise ScenarioError(problems)
         self.admit(wanted.client)
@@ -164,6 +168,7 @@ class Jobs:
                 purpose="what-if" if wanted.purpose == "what-if" and price.worker_s <= WHAT_IF_S else "run",
                 limit_s=wanted.limit_s,
                 changes=wanted.body.get("set", {}),
+                keep=wanted.keep,
             )
             await asyncio.to_thread(write_record, folder, job)
             kept, new = await asyncio.to_thread(self.store.add, job)
@@ -381,19 +386,35 @@ class Jobs:
         parts = [part for part in self._parts(job) if part[0].trials[0] not in gaps]
         if not parts:
             raise NothingLeft("; ".join(map(_loss, lost)))
-        result = runner.gather(scenario, parts, job.algorithms, lost)
         folder = self._folder / job.id
         outline = self.outline(job.id) or work.outline(scenario)
         artifacts.write_text(folder / VIEW, dumps(view.build(outline, parts, job.algorithms)))
-        artifacts.write_result(folder, result)
+        notes = [_loss(entry) for entry in lost]
+        if job.keep == "statistics":
+            result = runner.gather(statistics.shown(scenario), parts, job.algorithms)
+            artifacts.write_result(folder, result)
+            told = statistics.told(scenario, result.time_s, self._totals(job, parts), lost)
+            artifacts.write_statistics(folder, told)
+            notes.append(f"figures are of {told['trials']} trials, tracks and curves of the first {result.trials}")
+        else:
+            result = runner.gather(scenario, parts, job.algorithms, lost)
+            artifacts.write_result(folder, result)
+            told = result.to_json()
         graphs = [artifacts.graph_file(name) for name, tracks in result.tracks.items() if tracks.graph]
         artifacts.write_sums(folder, [*FILES, *graphs])
-        notes = [f"{name}: {note}" for name, tracks in result.tracks.items() for note in tracks.notes]
-        return [_loss(entry) for entry in lost] + notes
+        return notes + [f"{name}: {note}" for name, answer in told["algorithms"].items() for note in answer["notes"]]
+
+    def _totals(self, job: Job, parts: view.Parts) -> statistics.Totals:
+        """What all trials left: those kept whole, and one batch after the other."""
+        whole = statistics.of_tracks(parts[0][1], {shard.algorithm: tracks for shard, _, tracks in parts})
+        batches = (n for n in self.store.shards(job.id) if n >= len(job.algorithms))
+        read = (artifacts.read_totals(self._shard_file(job.id, n)) for n in batches)
+        return statistics.merged(itertools.chain([whole], read))
 
     def _parts(self, job: Job) -> view.Parts:
         with contextlib.suppress(FileNotFoundError):
-            return [artifacts.read_shard(self._shard_file(job.id, n)) for n in self.store.shards(job.id)]
+            whole = len(job.algorithms) if job.keep == "statistics" else math.inf
+            return [artifacts.read_shard(self._shard_file(job.id, n)) for n in self.store.shards(job.id) if n < whole]
         return []
 
     def _shard_file(self, id: str, number: int) -> Path:
@@ -404,9 +425,13 @@ class Jobs:
             path.unlink(missing_ok=True)
 
 
-def _planned(job: Job) -> tuple[ScenarioBase, list[runner.Shard]]:
+def _planned(job: Job) -> tuple[ScenarioBase, list[runner.Shard | Batch]]:
+    """A job's scenario and its shards; of one that keeps statistics first the trials kept whole, then batches."""
     scenario = toml.loads(job.toml, origin=job.origin)
-    return scenario, runner.shards(scenario, job.algorithms)
+    if job.keep == "tracks":
+        return scenario, [*runner.shards(scenario, job.algorithms)]
+    whole = runner.shards(statistics.shown(scenario), job.algorithms)
+    return scenario, [*whole, *statistics.batches(scenario, job.algorithms)]
 
 
 async def _to_the_end(function: Callable[..., T], *arguments: Any) -> T:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from engine.runner import Shard
+from engine.statistics import Batch
 from engine.tracks import Reference, Tracks
 from server import artifacts
 from server.store import Job, Store
 from server.watch import Watch
-from server.work import Piece
+from server.work import Answer, Piece
 
 log = logging.getLogger(__name__)
 
@@ -35,14 +36,16 @@ class Plan:
     cost {algorithm: (trials x subjects x mission seconds, worker seconds)} is what was computed here.
     """
 
-    def __init__(self, job: Job, shards: list[Shard], store: Store, watch: Watch, file: Callable[[int], Path]) -> None:
+    def __init__(
+        self, job: Job, shards: list[Shard | Batch], store: Store, watch: Watch, file: Callable[[int], Path]
+    ) -> None:
         self.client, self.urgent = job.client, job.purpose == "what-if"
         self._job, self._shards, self._store, self._watch, self._file = job, shards, store, watch, file
         over = {*store.shards(job.id), *store.lost(job.id)}
         self._pending = deque(n for n in range(len(shards)) if n not in over)
         self._left = len(self._pending)
         self._tries: dict[int, int] = {}
-        self._flown: dict[tuple[int, ...], str] = {}
+        self._flown: dict[Sequence[int], str] = {}
         self._unwritten = 0
         self.cost: dict[str, tuple[float, float]] = {}
         self.started, self.settled = asyncio.Event(), asyncio.Event()
@@ -79,24 +82,27 @@ class Plan:
                 break
         return self._pending[0] if fresh is None else fresh
 
-    async def finish(self, piece: Piece, answer: tuple[Reference, Tracks], seconds: float) -> None:
+    async def finish(self, piece: Piece, answer: Answer, seconds: float) -> None:
         """Keep an answer: its file whole, then that it is there."""
         self._unwritten += 1
         self.settled.clear()
         try:
-            digest = await asyncio.to_thread(artifacts.write_shard, self._file(piece.number), piece.shard, *answer)
+            digest = await asyncio.to_thread(_write, self._file(piece.number), piece, answer)
             self._watch.finish(piece.number)
             await asyncio.to_thread(self._store.finish_shard, self._job.id, piece.number, digest, self._watch.fraction)
         finally:
             self._unwritten -= 1
             if not self._unwritten:
                 self.settled.set()
-        reference, tracks = answer
+        if isinstance(answer, tuple):
+            self._count(piece, *answer, seconds)
+        self._one_less()
+
+    def _count(self, piece: Piece, reference: Reference, tracks: Tracks, seconds: float) -> None:
         length_s = float(np.ptp(reference.time_s)) if reference.time_s.size else 0.0
         work, spent = self.cost.get(piece.shard.algorithm, (0.0, 0.0))
         work += len(piece.shard.trials) * max(len(tracks.beliefs), 1) * length_s
         self.cost[piece.shard.algorithm] = work, spent + seconds
-        self._one_less()
 
     def put_back(self, piece: Piece) -> None:
         self._pending.appendleft(piece.number)
@@ -127,3 +133,10 @@ class Plan:
         self._left -= 1
         if self._left == 0 and not self.ended.done():
             self.ended.set_result(None)
+
+
+def _write(path: Path, piece: Piece, answer: Answer) -> str:
+    if isinstance(answer, tuple):
+        assert isinstance(piece.shard, Shard), "a batch leaves totals"
+        return artifacts.write_shard(path, piece.shard, *answer)
+    return artifacts.write_totals(path, answer)

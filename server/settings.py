@@ -21,7 +21,8 @@ class Settings:
 
     token, where set, is asked of everyone. cluster_ca, cluster_cert and cluster_key are PEM files for a scheduler at a
     tls:// address. workers counts the processes of our own cluster, worker_memory (bytes; None: their share of the
-    machine's) is what one of them may use. most_work is trials x vehicles x mission seconds x algorithms of one job;
+    machine's) is what one of them may use. most_trials is of a job that keeps tracks, most_trials_summed of one that
+    keeps statistics alone. most_work is trials x vehicles x mission seconds x algorithms of one job;
     jobs that ended keep_days ago, and the oldest while all take more than keep_bytes, are deleted unless pinned;
     least_free_disk (bytes) stays free on the disk of the data folder; of uploaded logs one file may have
     largest_log_file bytes, all together largest_logs. slowest_head_s and slowest_body_s are how long the head and the
@@ -44,6 +45,7 @@ class Settings:
     slowest_head_s: float = 20.0
     slowest_body_s: float = 60.0
     most_trials: int = 100_000
+    most_trials_summed: int = 1_000_000
     largest_result: int = 2 * 1024**3
     most_work: float = 2e11
     most_jobs_waiting: int = 400

@@ -58,6 +58,9 @@ ALTER TABLE jobs ADD COLUMN changes TEXT NOT NULL DEFAULT '{}';
     """
 CREATE TABLE notes (key TEXT PRIMARY KEY, value TEXT NOT NULL)
 """,
+    """
+ALTER TABLE jobs ADD COLUMN keep TEXT NOT NULL DEFAULT 'tracks'
+""",
 )
 VERSION = len(MIGRATIONS)
 
@@ -68,7 +71,8 @@ class Job:
 
     purpose is "run" or "what-if", which goes before others; limit_s bounds the time it may run; lost tells of the
     shards that were given up: {"algorithm", "trials", "seed", "tries", "reason"} each. tags and pinned are its owner's
-    marks; changes are the values by key path that its scenario was given on submission.
+    marks; changes are the values by key path that its scenario was given on submission. keep is "tracks", or
+    "statistics" where of most trials only figures over them are kept.
     """
 
     id: str
@@ -96,6 +100,7 @@ class Job:
     lost: list[dict[str, Any]] = field(default_factory=list)
     tags: list[str] = field(default_factory=list)
     changes: dict[str, Any] = field(default_factory=dict)
+    keep: str = "tracks"
 
     def public(self) -> dict[str, Any]:
         """The job as REST shows it."""

@@ -14,8 +14,8 @@ from server.journal import Journal
 from server.store import Job, Store
 from server.wire import dumps
 
-#: Progress of a job is told at most this often.
-PROGRESS_S = 0.1
+#: Progress of a job is told at most this often, and less often the longer it runs: all in all some thousand times.
+PROGRESS_S, PROGRESS_SHARE = 0.1, 1 / 300
 
 
 class Watch:
@@ -26,7 +26,7 @@ class Watch:
         self._told = dict.fromkeys(finished, 1.0)
         self._shards, self._done = shards, set(finished)
         self._last: dict[str, float] = {}
-        self._said = -math.inf
+        self._said, self._begun = -math.inf, asyncio.get_running_loop().time()
 
     @property
     def fraction(self) -> float:
@@ -77,7 +77,7 @@ class Watch:
 
     def _progress(self, always: bool = False) -> None:
         moment = asyncio.get_running_loop().time()
-        if always or moment - self._said >= PROGRESS_S:
+        if always or moment - self._said >= max(PROGRESS_S, PROGRESS_SHARE * (moment - self._begun)):
             self._said = moment
             done = {"fraction": self.fraction, "shards_done": len(self._done), "shards": self._shards}
             self._journal.say(self._job.id, "progress", done)

@@ -13,11 +13,15 @@ from typing import Any
 from distributed import get_worker
 from distributed.diagnostics.plugin import WorkerPlugin
 
-from engine import registry, runner
+from engine import registry, runner, statistics
 from engine.runner import Shard
 from engine.scenario import toml
 from engine.scenario.models import ScenarioBase
+from engine.statistics import Batch, Totals
 from engine.tracks import Reference, Tracks
+
+#: What a shard's run answers, or a batch's.
+Answer = tuple[Reference, Tracks] | Totals
 
 _lock = threading.Lock()
 _at_work: dict[str, int] = {}
@@ -26,13 +30,13 @@ _stopped: set[str] = set()
 
 @dataclass(frozen=True)
 class Piece:
-    """Shard `number` of a job whose scenario is a TOML text, to be read with its origin."""
+    """Shard or batch `number` of a job whose scenario is a TOML text, to be read with its origin."""
 
     job: str
     number: int
     text: str
     origin: str
-    shard: Shard
+    shard: Shard | Batch
 
 
 class Stopped(Exception):
@@ -83,7 +87,7 @@ def end(dask_worker: Any) -> None:
     os.kill(dask_worker.pid, signal.SIGKILL)
 
 
-def run(topic: str, key: str, piece: Piece) -> tuple[Reference, Tracks] | None:
+def run(topic: str, key: str, piece: Piece) -> Answer | None:
     """Run a piece under a key and tell of it on a topic; None where it was stopped.
 
     Told are {"job", "number", "algorithm", "fraction", "partial", "outline"}: estimates and the outline of the
@@ -112,6 +116,8 @@ def run(topic: str, key: str, piece: Piece) -> tuple[Reference, Tracks] | None:
             _at_work[key] = threading.get_ident()
         scenario = toml.loads(piece.text, origin=piece.origin)
         tell(0.0)
+        if isinstance(shard, Batch):
+            return statistics.run_batch(scenario, shard, tell)
         mission = runner.prepare(scenario, shard.trials)
         if watched:
             tell(0.0, outline=outlined(scenario.family, mission))

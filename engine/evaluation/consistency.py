@@ -88,13 +88,16 @@ class Verdict:
 
 
 def judge(value: np.ndarray) -> Verdict:
-    """The verdict on NEES values (trials, T), NaN where there is nothing to compare with.
+    """The verdict on NEES values (trials, T), NaN where there is nothing to compare with."""
+    return verdict(*trial_mean(value), value.shape[0])
+
+
+def verdict(average: np.ndarray, count: np.ndarray, trials: int) -> Verdict:
+    """The verdict on the NEES averaged over `count` of the trials at each time, both (T,).
 
     Each time is judged by the interval of the trials that count there.
     """
-    trials = value.shape[0]
     low, high = nees_interval(trials)
-    average, count = trial_mean(value)
     tested = count > 0
     if not tested.any():
         return Verdict("no reference", None, np.nan, (low, high), "There is no reference to compare with.")

@@ -70,7 +70,7 @@ def assemble(scenario: Any, reference: Reference, tracks: Mapping[str, Tracks]) 
     known = registry.algorithms()
     centralized = next((name for name in tracks if name in known and known[name].centralized), None)
     metrics = evaluate(reference, tracks, centralized)
-    claims = check(scenario.claims, {"algorithms": _algorithms(tracks, metrics, _capacity(scenario))})
+    claims = check(scenario.claims, {"algorithms": _algorithms(tracks, metrics, capacity(scenario))})
     return Result(
         scenario=scenario.model_dump(mode="json", by_alias=True, exclude_none=True),
         seed=scenario.seed,
@@ -80,11 +80,11 @@ def assemble(scenario: Any, reference: Reference, tracks: Mapping[str, Tracks]) 
         tracks=dict(tracks),
         truth=reference.truth,
         time_s=reference.time_s,
-        capacity_bps=_capacity(scenario),
+        capacity_bps=capacity(scenario),
     )
 
 
-def _capacity(scenario: Any) -> float | None:
+def capacity(scenario: Any) -> float | None:
     """What the scenario says its channel carries, bit/s; families without a network have none."""
     return getattr(getattr(scenario, "network", None), "capacity_bps", None)
 

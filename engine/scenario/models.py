@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from engine.scenario.errors import Problem
 
-MAX_TRIALS = 100_000
+MAX_TRIALS = 1_000_000
 MAX_DURATION_S = 30 * 86_400.0
 #: Unknown keys of one table that are told of.
 MAX_UNKNOWN = 20

@@ -32,6 +32,9 @@ class Submission(BaseModel):
     seed: int | None = Field(None, ge=0)
     set: dict[str, Any] = Field({}, max_length=200, description="key paths and their values, as in network.loss: 0.4")
     purpose: Literal["run", "what-if"] = Field("run", description="a small what-if goes before other jobs")
+    keep: Literal["tracks", "statistics"] = Field(
+        "tracks", description="statistics: of all trials but the first few only figures over them; up to a million"
+    )
     limit_s: float | None = Field(None, gt=0, allow_inf_nan=False, description="end it if it runs longer, s")
 
 
@@ -61,6 +64,7 @@ async def submit(
             client=client,
             purpose=body.purpose,
             limit_s=body.limit_s,
+            keep=body.keep,
         )
     )
     response.headers["location"] = f"/api/jobs/{job.id}"
@@ -70,7 +74,7 @@ async def submit(
 @router.post("/jobs/estimate")
 def estimate(body: Submission, here: Here) -> dict[str, Any]:
     """What a job would cost (worker seconds, bytes of result and memory) and whether it would be accepted."""
-    return here.jobs.estimate(_wanted(body, here), body.algorithms)
+    return here.jobs.estimate(_wanted(body, here), body.algorithms, body.keep)
 
 
 @router.get("/jobs")
@@ -80,7 +84,7 @@ def jobs(here: Here) -> list[dict[str, Any]]:
 
 
 @router.get("/jobs/{id}")
-def job(id: str, here: Here) -> dict[str, Any]:
+async def job(id: str, here: Here) -> dict[str, Any]:
     """A job's state."""
     return here.jobs.find(id).public()
 
@@ -112,7 +116,8 @@ async def events(id: str, here: Here, last_event_id: Annotated[str, Header()] = 
 @router.get("/jobs/{id}/result", response_class=FileResponse)
 def result(id: str, here: Here) -> FileResponse:
     """result.json of a finished job."""
-    return FileResponse(here.jobs.artifact(id, artifacts.RESULT), media_type="application/json")
+    path = here.jobs.artifact(id, artifacts.RESULT)
+    return FileResponse(path, media_type="application/json", stat_result=path.stat())
 
 
 @router.get("/jobs/{id}/arrays", response_class=FileResponse)

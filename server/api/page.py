@@ -25,23 +25,24 @@ TYPES = {
 
 
 @router.get("/")
-def index() -> FileResponse:
-    return static("index.html")
+async def index() -> FileResponse:
+    return await static("index.html")
 
 
 @router.get("/favicon.ico")
-def icon() -> FileResponse:
-    return static("icon.svg")
+async def icon() -> FileResponse:
+    return await static("icon.svg")
 
 
 @router.get("/static/{path:path}")
-def static(path: str) -> FileResponse:
+async def static(path: str) -> FileResponse:
     """A file of the page, asked for anew each time, for it has no version in its name."""
     root = assets.static_directory().resolve()
     file = root if "\0" in path else (root / path).resolve()
     if not file.is_relative_to(root) or not file.is_file() or file.suffix not in TYPES:
         raise Refusal(404, "unknown", "there is no such file")
-    return FileResponse(file, media_type=TYPES[file.suffix], headers={"cache-control": "no-cache"})
+    headers = {"cache-control": "no-cache"}
+    return FileResponse(file, media_type=TYPES[file.suffix], headers=headers, stat_result=file.stat())
 
 
 @router.get("/vendor/plotly.min.js")

@@ -46,6 +46,17 @@ def test_the_workers_do_not_change_the_numbers(tmp_path: Path):
             np.testing.assert_array_equal(one[key], two[key])
 
 
+def test_statistics_of_many_trials_are_kept_without_their_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    command = ["run", "first-look", "--trials", "60", "--algorithms", "dead_reckoning", "--statistics", *QUICK]
+    assert main([*command, "--out", str(tmp_path / "run")]) == 0
+    assert "60 trials" in capsys.readouterr().out
+    told = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert told["algorithms"]["dead_reckoning"]["subjects"]["scout"]["error_over_trials"]["trials"] == 60
+    assert not (tmp_path / "run" / "arrays.npz").exists()
+    assert main([*command, "--sweep", "network.loss=0,0.5", "--out", str(tmp_path / "sweep")]) == 0
+    assert json.loads((tmp_path / "sweep" / "network.loss=0.5" / "result.json").read_text())["trials"] == 60
+
+
 def test_a_scenario_is_a_name_a_file_or_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     file = tmp_path / "scenario.toml"
     file.write_text(toml.dumps(library.shipped("first-look")))

@@ -31,7 +31,7 @@ def put(path: str, value: Any) -> dict[str, Any]:
         ("schema", 2, "schema", "schema = 1"),
         ("family", "navigaton", "family", "navigation"),
         ("trials", 0, "trials", "greater than or equal to 1"),
-        ("trials", 1_000_000, "trials", "less than or equal to 100000"),
+        ("trials", 10_000_000, "trials", "less than or equal to 1000000"),
         ("trials", 2.5, "trials", "integer"),
         ("duration_s", -1, "duration_s", "greater than 0"),
         ("duration_s", 1e12, "duration_s", "less than or equal"),
