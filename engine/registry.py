@@ -48,8 +48,9 @@ class Algorithm:
 class Outline:
     """What a mission looks like to someone watching its first trial, in JSON's own types.
 
-    subjects: {"name", "kind", "depth_m"} each; events in order of time: {"kind": "packet", "from", "to", "tol_s",
-    "toa_s", "heard"} and {"kind": "fix", "subject", "time_s"}, the latter at most one a second.
+    subjects: {"name", "kind", "depth_m"} each, and "label" where something else than the name, or nothing, is to stand
+    beside it; events in order of time: {"kind": "packet", "from", "to", "tol_s", "toa_s", "heard"} and {"kind":
+    "fix", "subject", "time_s"}, the latter at most one a second.
     """
 
     subjects: list[dict[str, Any]]

@@ -171,5 +171,8 @@ def outline(mission: PursuitMission) -> Outline:
         return Outline([{"name": "target", "kind": "target", "depth_m": 0.0}, *receivers], [])
     vehicles = [{"name": v.name, "kind": "surface", "depth_m": v.depth_m} for v in mission.scenario.vehicles]
     depth = mission.scenario.target.depth_m
-    targets = [{"name": subject(name), "kind": "target", "depth_m": depth} for name in mission.names]
+    targets = [
+        {"name": subject(name), "kind": "target", "depth_m": depth, "label": "" if n else "target"}
+        for n, name in enumerate(mission.names)
+    ]
     return Outline([*vehicles, *targets], [])

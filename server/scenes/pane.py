@@ -127,13 +127,17 @@ class Pane:
         scene.add_frame(f"/vehicle/{n}", show_axes=False, visible=False)
         size = 0.06 if subject["kind"] == "fixed" else 0.1
         scene.add_icosphere(f"/vehicle/{n}/body", radius=size, color=colour, subdivisions=2, cast_shadow=False)
-        scene.add_label(
-            f"/vehicle/{n}/name",
-            subject["name"],
-            position=(0.0, 0.0, 0.2),
-            font_screen_scale=0.9,
-            anchor="bottom-center",
-        )
+        label = subject.get("label", subject["name"])
+        if label:
+            scene.add_label(
+                f"/vehicle/{n}/name",
+                label,
+                position=(0.0, 0.0, 0.2),
+                font_screen_scale=0.9,
+                anchor="bottom-center",
+            )
+        else:
+            scene.remove_by_name(f"/vehicle/{n}/name")
         mast = [np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, up]]])] if up > 0.02 else []
         self._lines(f"/vehicle/{n}/mast", mast, [self._look.faded(colour, 0.5)], 1.0)
         scene.add_icosphere(
