@@ -31,7 +31,7 @@ export function mountSchedule() {
   let shown = [];
   let wanted = "";
   store.watch(["view", "job", "algorithms"], async ({ view, job, algorithms }) => {
-    const names = job?.state === "done" ? schedulers(view) : [];
+    const names = job?.state === "done" && algorithms ? schedulers(view) : [];
     room.hidden = !names.length;
     const key = names.length ? `${job.id} ${names.join(" ")}` : "";
     if (key === wanted) return;
@@ -41,13 +41,12 @@ export function mountSchedule() {
     if (!names.length) return;
     const told = await schedules(job.id, names);
     if (wanted !== key) return;
-    const known = algorithms ?? [];
     shown = told.map(({ name, story }) => ({
       story,
-      tape: buildTape({ story, title: known.find((a) => a.name === name)?.title ?? name, swatch: lineSample(name, known), colourOf }),
+      tape: buildTape({ story, title: algorithms.find((a) => a.name === name)?.title ?? name, swatch: lineSample(name, algorithms), colourOf }),
     }));
     tapes.replaceChildren(...shown.map(({ tape }) => tape.root));
-    response.show(told, known);
+    response.show(told, algorithms);
   });
   clock.watch(() => !room.hidden && shown.forEach(({ tape }) => tape.show()));
 

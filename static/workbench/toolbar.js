@@ -3,6 +3,7 @@
 import { el, part } from "../look/dom.js";
 import { vehicleColour } from "../look/palette.js";
 import { dot } from "../look/swatch.js";
+import { schedulers } from "../pursuit/story.js";
 import { tellers } from "../smoothing/story.js";
 import { store } from "../state/store.js";
 
@@ -11,6 +12,7 @@ const OPTIONS = {
   ellipses: { label: "Ellipses", on: true, hint: "95 % ellipses along the track" },
   rays: { label: "Rays", on: true, hint: "Packets: the sender's colour when heard, grey when lost" },
   graph: { label: "Graph", on: false, hint: "Factor graph of the chosen vehicle, smoothed: received poses solid, lost ones hollow, priors square, composed links as arcs" },
+  pursuit: { label: "Formation", on: true, hint: "Waypoints, the formation kept and the one wanted (dashed), messages under way, and what the chosen vehicle knows: hyperbolas of equal time difference with two sigmas on either side" },
   follow: { label: "Follow", on: false, hint: "Keep the chosen vehicle in the middle" },
   top: { label: "From above", on: false, hint: "Look straight down, north up" },
 };
@@ -22,7 +24,7 @@ export function mountToolbar(session) {
     const chosen = Object.fromEntries(Object.entries(boxes).map(([name, box]) => [name, box.checked]));
     const named = (on) => (on ? store.state.vehicle : null);
     const hidden = [...store.state.hidden.vehicles];
-    session.options({ ...chosen, hidden, follow: named(chosen.follow), graph: named(chosen.graph) });
+    session.options({ ...chosen, hidden, follow: named(chosen.follow), graph: named(chosen.graph), pursuit: named(chosen.pursuit) });
   };
   const toggles = Object.entries(OPTIONS).map(([name, { label, on, hint }]) => {
     boxes[name] = el("input", { type: "checkbox", name: `pane-${name}`, checked: on, onchange: tell });
@@ -42,8 +44,11 @@ export function mountToolbar(session) {
     for (const input of vehicles.querySelectorAll("input")) input.checked = input.value === vehicle;
   });
   store.watch(["hidden"], tell);
-  store.watch(["vehicle"], () => (boxes.follow.checked || boxes.graph.checked) && tell());
-  store.watch(["view"], ({ view }) => (boxes.graph.parentElement.hidden = !tellers(view).length));
+  store.watch(["vehicle"], () => (boxes.follow.checked || boxes.graph.checked || boxes.pursuit.checked) && tell());
+  store.watch(["view"], ({ view }) => {
+    boxes.graph.parentElement.hidden = !tellers(view).length;
+    boxes.pursuit.parentElement.hidden = !schedulers(view).length;
+  });
 }
 
 function choice({ name, kind }, n) {
