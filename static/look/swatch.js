@@ -1,4 +1,5 @@
 import { el, svg } from "./dom.js";
+import "./hint.js";
 import { lineStyle } from "./palette.js";
 
 /** A short sample of an algorithm's line, as it looks in the plots. */
@@ -27,12 +28,12 @@ const VERDICTS = {
   "no reference": { mark: "?", tone: "calm" },
 };
 
-/** Whether an estimator's confidence can be believed, in a word; the sentence that says why on hover. */
+/** Whether an estimator's confidence can be believed, in a word; the sentence that says why when it is pointed at or focused. */
 export function verdictChip(metrics) {
   const { mark, tone } = VERDICTS[metrics.verdict] ?? VERDICTS["no reference"];
   return el(
     "span",
-    { class: `verdict ${tone}`, title: metrics.explanation ?? "" },
+    { class: `verdict ${tone}`, tabindex: 0, "data-hint": metrics.explanation ?? "" },
     el("span", { class: "mark", "aria-hidden": "true" }, mark),
     metrics.verdict ?? "no reference",
   );

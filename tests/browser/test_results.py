@@ -21,7 +21,7 @@ def test_the_table_has_figures_and_verdicts(opened: Page, server: Server, run: s
     assert abs(shown - rmse) <= 0.005 * rmse
     for verdict in opened.locator("#table .verdict").all():
         assert re.search("consistent|overconfident|conservative", verdict.inner_text())
-        assert (verdict.get_attribute("title") or "").endswith("."), "the verdict is explained in a sentence"
+        assert (verdict.get_attribute("data-hint") or "").endswith("."), "the verdict is explained in a sentence"
     sent = opened.locator("#table tbody[data-algorithm=nekf] td[rowspan]").first.inner_text()
     assert int(re.sub(r"\D", "", sent)) == result["algorithms"]["nekf"]["packets"]["sent"]
     opened.locator("#table").scroll_into_view_if_needed()
