@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from distributed import LocalCluster
+from distributed.security import Security
 
 from engine import runner
 from server.settings import Settings
@@ -71,3 +75,41 @@ def test_a_cluster_that_does_not_answer_is_told_and_jobs_wait(tmp_path: Path):
     assert waiting.job(id)["state"] == "queued"
     assert waiting.http.post(f"/api/jobs/{id}/cancel").json()["state"] == "cancelled"
     assert next(server, None) is None
+
+
+def test_a_scheduler_and_workers_started_by_hand_with_certificates(live: Live, tmp_path: Path):
+    """As on a cluster whose nodes are shared: nobody without the certificates gets a word in."""
+    made = Security.temporary()
+    pem = {name: tmp_path / f"{name}.pem" for name in ("ca", "cert", "key")}
+    for file, text in zip(pem.values(), (made.tls_ca_file, made.tls_client_cert, made.tls_client_key)):
+        assert isinstance(text, str)
+        file.write_text(text)
+    keys = ["--tls-ca-file", str(pem["ca"]), "--tls-cert", str(pem["cert"]), "--tls-key", str(pem["key"])]
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"tls://127.0.0.1:{probe.getsockname()[1]}"
+    at = ["--host", "tls://127.0.0.1", "--no-dashboard", *keys]
+    commands = [["scheduler", "--port", address.rpartition(":")[2]], ["worker", address, "--nthreads", "1"]]
+    running = [
+        subprocess.Popen([sys.executable, "-m", "dask", *command, *at], stderr=subprocess.DEVNULL)
+        for command in commands
+    ]
+    try:
+        settings = Settings(
+            data=tmp_path / "data",
+            port=0,
+            cluster=address,
+            cluster_ca=pem["ca"],
+            cluster_cert=pem["cert"],
+            cluster_key=pem["key"],
+        )
+        server = start(settings)
+        theirs = next(server)
+        results = [s.http.get(f"/api/jobs/{s.done(SHORT)['id']}/result").json()["algorithms"] for s in (live, theirs)]
+        for name, answer in results[0].items():
+            assert answer["subjects"] == results[1][name]["subjects"]
+        assert next(server, None) is None
+    finally:
+        for process in reversed(running):
+            process.terminate()
+            process.wait()
