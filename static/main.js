@@ -17,6 +17,7 @@ import { clock } from "./state/clock.js";
 import { suspect } from "./state/connection.js";
 import { pickAgain, readLibrary } from "./state/library.js";
 import { mountLink } from "./state/link.js";
+import { keepPanesInLink, paneNames, paneState } from "./state/panes.js";
 import { store } from "./state/store.js";
 import { isTrial } from "./state/whatif.js";
 import { mountStudies } from "./studies/studies.js";
@@ -26,7 +27,7 @@ import { mountUpload } from "./upload/dialog.js";
 import { SceneSession } from "./wire/scenes.js";
 import { mountClaims } from "./workbench/claims.js";
 import { mountHeadline } from "./workbench/headline.js";
-import { MOST_PANES, hasWebGL, mountPanes } from "./workbench/panes.js";
+import { mountPanes } from "./workbench/panes.js";
 import { mountPlots } from "./workbench/plots.js";
 import { mountTable } from "./workbench/table.js";
 import { mountTimeline } from "./workbench/timeline.js";
@@ -50,10 +51,12 @@ mountHeadline();
 const panes = mountPanes(listenKeys);
 const session = new SceneSession({
   scenes: (addresses) => panes.place(addresses),
+  camera: (pose) => paneState.set({ camera: pose }),
   error: (detail) => panes.fail(detail),
   link: (up) => (up ? store.set({ connected: true }) : suspect()),
 });
-mountToolbar(session);
+mountToolbar(session, panes);
+keepPanesInLink((pose) => session.look(pose));
 mountTimeline();
 mountSchedule();
 mountPlots();
@@ -67,11 +70,19 @@ listenKeys(window);
 store.watch(["run", "room"], ({ run, room }) => (part("workbench").hidden = run === null || room !== "workbench"));
 
 let shown = null;
-store.watch(["job"], ({ job }) => {
-  if (!hasWebGL || (job?.id ?? null) === shown) return;
-  shown = job?.id ?? null;
-  if (job) session.show(job.id, job.algorithms.slice(0, MOST_PANES));
-});
+const showScenes = () => {
+  const { job, hidden } = store.state;
+  const { layout } = paneState.state;
+  const names = layout === "plan" ? [] : paneNames(job, layout, hidden);
+  const wanted = names.length ? JSON.stringify([job.id, names]) : null;
+  if (wanted === shown) return;
+  shown = wanted;
+  if (wanted === null) return;
+  session.show(job.id, names);
+  if (clock.end > clock.start && !clock.following) session.seek(clock.time);
+};
+store.watch(["job", "hidden"], showScenes);
+paneState.watch(["layout"], showScenes);
 let picked = null;
 store.watch(["job", "missions"], ({ job, missions }) => {
   if (!job || missions === null || job.id === picked) return;

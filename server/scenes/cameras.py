@@ -20,6 +20,8 @@ LEAD_S = 0.3
 #: A viewer that is not at the pose it was given is told again this often; one that has not come to it by the
 #: deadline, however busy its machine, is being moved by its user.
 TELL_S, SETTLE_S = 0.3, 20.0
+#: The same for a viewer that was there before it was turned by us.
+TURN_S = 3.0
 #: Poses closer than this (scene units) are the same.
 SAME = 0.01
 
@@ -36,27 +38,31 @@ class Cameras:
         self._leader: Pane | None = None
         self._moved = 0.0
         self._again: asyncio.TimerHandle | None = None
+        self._turns = 0
         self.linked = True
         self.pose = OBLIQUE
 
     def join(self, pane: Pane) -> None:
         """Give a pane's viewers the shared pose and let them lead.
 
-        A viewer starts where viser's client puts it and says so, more than once; it is heard only when it has
-        come to the pose it was given.
+        A viewer starts where viser's client puts it and says so, more than once, and one that we turn goes on for a
+        while to say where it was: it is heard only when it has come to the pose it was given.
         """
         self._poses[pane] = self.pose
         pane.begin_at(self.pose)
 
         @pane.server.on_client_connect
         def connected(client: viser.ClientHandle) -> None:
-            told, settled = time.monotonic(), False
+            told, settled, turns = time.monotonic(), False, self._turns
             deadline = told + SETTLE_S
 
             @client.camera.on_update
             def moved(camera: viser.CameraHandle) -> None:
-                nonlocal told, settled
+                nonlocal told, settled, turns, deadline
                 pose, now = np.concatenate([camera.position, camera.look_at]), time.monotonic()
+                if settled and turns != self._turns:
+                    settled, deadline = False, now + TURN_S
+                turns = self._turns
                 if settled:
                     self._loop.call_soon_threadsafe(self._lead, pane, pose)
                     return
@@ -77,6 +83,7 @@ class Cameras:
         """Turn all viewers to a pose (6,)."""
         self.pose, self._leader, self._moved = pose, None, time.monotonic()
         self._poses = dict.fromkeys(self._poses, pose)
+        self._turns += 1
         self._follow()
 
     def shift(self, step: np.ndarray) -> None:
@@ -84,6 +91,7 @@ class Cameras:
         both = np.concatenate([step, step])
         self.pose, self._leader, self._moved = self.pose + both, None, time.monotonic()
         self._poses = {pane: pose + both for pane, pose in self._poses.items()}
+        self._turns += 1
         self._follow()
 
     def link(self, linked: bool) -> None:

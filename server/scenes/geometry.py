@@ -81,12 +81,12 @@ def round_length(metres: float) -> float:
 
 
 def scale_bar(chart: Chart) -> tuple[np.ndarray, float]:
-    """A bar of a round length, in the south-west of the surface, as segments (M, 2, 3), and its length in metres."""
+    """A bar of a round length, in the north-west of the surface, as segments (M, 2, 3), and its length in metres."""
     length_m = round_length(SPAN / chart.scale / 4)
-    west, south = -0.62 * SPAN, -0.69 * SPAN
+    west, north = -0.62 * SPAN, 0.61 * SPAN
     east, tick = west + length_m * chart.scale, 0.012 * SPAN
-    ends = [((west, south), (east, south))]
-    ends += [((x, south - tick), (x, south + tick)) for x in (west, (west + east) / 2, east)]
+    ends = [((west, north), (east, north))]
+    ends += [((x, north - tick), (x, north + tick)) for x in (west, (west + east) / 2, east)]
     return np.array([[(*a, 0.0), (*b, 0.0)] for a, b in ends]), length_m
 
 

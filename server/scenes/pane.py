@@ -144,8 +144,9 @@ class Pane:
             f"/true/{n}", radius=0.6 * size, color=self._look.truth, subdivisions=2, cast_shadow=False, visible=False
         )
 
-    def show(self, algorithms: Sequence[str], moment_s: float, options: Options) -> None:
+    def show(self, algorithms: Sequence[str], moment_s: float, options: Options, overlay: bool = False) -> None:
         """Draw estimates as they are at a moment of the mission: one algorithm's, or several laid over each other."""
+        self._overlay = overlay
         footage, without = self.footage, options.hidden
         now = {
             name: {s: at(track.time_s, mean, moment_s) for s, mean in track.mean.items() if s not in without}
@@ -165,11 +166,11 @@ class Pane:
             self._rays(moment_s, first, truth, options)
             self._graph(algorithms, moment_s, options.graph)
             self._pursuit(algorithms, moment_s, options.pursuit, first, truth)
-            self._place(first if len(algorithms) == 1 else first | truth, truth if len(algorithms) == 1 else {})
+            self._place(first | truth if overlay else first, {} if overlay else truth)
 
-    def _colour(self, algorithm: str, n: int, now: Mapping[str, Places], options: Options) -> palette.Rgb:
+    def _colour(self, algorithm: str, n: int, options: Options) -> palette.Rgb:
         """Of a vehicle's estimates; where algorithms are laid over each other, the algorithm's."""
-        if len(now) > 1 and algorithm in options.colours:
+        if self._overlay and algorithm in options.colours:
             r, g, b = options.colours[algorithm]
             return r, g, b
         return palette.vehicle(n)
@@ -188,7 +189,7 @@ class Pane:
             for n, name in enumerate(footage.names):
                 if name not in places or not self._moves(name):
                     continue
-                depth, mean, colour = self._depth(name), track.mean[name], self._colour(algorithm, n, now, options)
+                depth, mean, colour = self._depth(name), track.mean[name], self._colour(algorithm, n, options)
                 line = np.concatenate([mean[shown[shown < past]], places[name][None]])
                 lines.append(segments(self._chart.place(line, depth)))
                 colours.append(colour)
@@ -211,10 +212,10 @@ class Pane:
                 cov = at(track.time_s, track.cov[name], moment_s)
                 ring = ellipses(self._chart, mean[None], cov[None], depth, radius(options.sigma))
                 lines.append(ring.reshape(-1, 2, 3))
-                colours.append(self._colour(algorithm, n, now, options))
+                colours.append(self._colour(algorithm, n, options))
                 if name in truth:
                     lines.append(segments(self._chart.place(np.stack([mean, truth[name]]), depth)))
-                    colours.append(self._look.truth if len(now) == 1 else colours[-1])
+                    colours.append(colours[-1] if self._overlay else self._look.truth)
         self._lines("/present", lines, colours, 3.5)
 
     def _trials(self, moment_s: float, now: Mapping[str, Places], options: Options) -> None:
@@ -229,7 +230,7 @@ class Pane:
             for n, name in enumerate(self.footage.names):
                 if found is None or name not in places or name not in found.points:
                     continue
-                colour, depth = self._colour(algorithm, n, now, options), self._depth(name)
+                colour, depth = self._colour(algorithm, n, options), self._depth(name)
                 here = found.at(name, moment_s)
                 if options.cloud:
                     points.append(self._chart.place(here, depth))
@@ -273,7 +274,7 @@ class Pane:
 
     def _graph(self, algorithms: Sequence[str], moment_s: float, whose: str | None) -> None:
         """The factor graph of a vehicle up to the moment, or everybody's; nothing where there is none or it is off."""
-        graphs = self.footage.graphs.get(algorithms[0], {}) if len(algorithms) == 1 else {}
+        graphs = {} if self._overlay else self.footage.graphs.get(algorithms[0], {})
         found = None if whose is None else graphs.get(whose, graphs.get(""))
         if found is None and not self._graphed:
             return

@@ -294,7 +294,7 @@ class Session:
     def _show_panes(self, moment: float) -> None:
         for name, (_, pane) in self._panes.items():
             pane.ensembles = self._ensembles or {}
-            pane.show(self._drawn(name), moment, self._options)
+            pane.show(self._drawn(name), moment, self._options, overlay=name == OVERLAY)
 
 
 def _graphs(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, dict[str, graph.Graph]]:

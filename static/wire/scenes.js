@@ -8,7 +8,7 @@ const PATIENCE_MS = 1500;
 /**
  * A websocket that is opened again when it breaks, and then asked for the same panes.
  *
- * `on.scenes({pane: url})`, `on.error(detail)`, `on.link(up)`. One seek is in flight at a time; the newest wins.
+ * `on.scenes({pane: url})`, `on.camera(pose)`, `on.error(detail)`, `on.link(up)`. One seek is in flight at a time; the newest wins.
  */
 export class SceneSession {
   constructor(on) {
@@ -19,6 +19,7 @@ export class SceneSession {
     this.flying = 0;
     this.next = null;
     this.last = null;
+    this.pose = null;
     this.open();
   }
 
@@ -49,10 +50,17 @@ export class SceneSession {
   ask() {
     this.send({ type: "show", ...this.wanted });
     this.send({ type: "options", ...this.settings });
+    if (this.pose) this.send({ type: "camera", pose: this.pose });
     if (this.last !== null) this.seek(this.last);
   }
 
-  /** What the panes draw: {trails, rays, follow, top}. */
+  /** Looks from a position at a point, together six numbers in scene units. */
+  look(pose) {
+    this.pose = pose;
+    this.send({ type: "camera", pose });
+  }
+
+  /** What the panes draw, as the server's options have it. */
   options(settings) {
     this.settings = { ...this.settings, ...settings };
     this.send({ type: "options", ...this.settings });
@@ -72,6 +80,9 @@ export class SceneSession {
     else if (message.type === "scenes") {
       this.on.scenes(message.panes);
       if (this.last !== null) this.seek(this.last);
+    } else if (message.type === "camera") {
+      this.pose = message.pose;
+      this.on.camera(message.pose);
     } else if (message.type === "error") this.on.error(message.detail);
   }
 

@@ -1,4 +1,4 @@
-// One 3D pane per algorithm: a scene of the server in a frame, under a bar with its name and readings.
+// One pane per algorithm, or one for all: a scene of the server in a frame, or a plan, under a bar with its name and readings.
 
 import { el, part, say } from "../look/dom.js";
 import { metres, plural } from "../look/format.js";
@@ -6,14 +6,13 @@ import { darkScheme, lineStyle } from "../look/palette.js";
 import { lineSample, verdictChip } from "../look/swatch.js";
 import { clock } from "../state/clock.js";
 import { atWork } from "../state/run.js";
+import { MOST_PANES, OVERLAY, hasWebGL, paneNames, paneState } from "../state/panes.js";
 import { departure, indexAt, sigmaOf } from "../state/samples.js";
 import { store } from "../state/store.js";
+import { planPane } from "./planpane.js";
 
-export const MOST_PANES = 6;
 /** Squared Mahalanobis distance that 95 % of a plane Gaussian's errors stay below. */
 const CHI2_95 = 5.991;
-
-export const hasWebGL = Boolean(document.createElement("canvas").getContext("webgl2"));
 
 /** Panes in the section, filled by what the session's server answers; `keys(window)` gets each frame's window. */
 export function mountPanes(keys) {
@@ -23,34 +22,49 @@ export function mountPanes(keys) {
   const grid = el("div", { class: "grid" });
   room.append(grid, note);
 
-  function arrange(job) {
-    const names = hasWebGL ? (job?.algorithms ?? []).slice(0, MOST_PANES) : [];
+  let drawn = paneState.state.layout;
+
+  function arrange() {
+    const { job, hidden } = store.state;
+    const { layout } = paneState.state;
+    const names = paneNames(job, layout, hidden);
     for (const [name, pane] of panes) {
-      if (!names.includes(name)) {
+      if (!names.includes(name) || (layout === "plan") !== (drawn === "plan")) {
+        pane.plan?.close();
         pane.root.remove();
         panes.delete(name);
       }
     }
+    drawn = layout;
     names.forEach((name, n) => {
-      if (!panes.has(name)) panes.set(name, build(name, keys, unveil));
+      if (!panes.has(name)) panes.set(name, build(name, layout === "plan", keys, unveil));
       const { root } = panes.get(name);
       // A frame that moves in the document loads again, so only what is out of place moves.
       if (grid.children[n] !== root) grid.insertBefore(root, grid.children[n] ?? null);
     });
-    const left = (job?.algorithms.length ?? 0) - names.length;
+    const left = layout === "overlay" ? 0 : (job?.algorithms.length ?? 0) - names.length;
     note.hidden = !job || (hasWebGL && left <= 0);
-    note.textContent = hasWebGL
-      ? `${plural(left, "more estimator")} in the plots and the table: ${MOST_PANES} panes are the most a browser draws smoothly.`
-      : "This browser draws no WebGL, so there are no 3D panes; plots and table show the same run. Switch on hardware acceleration or WebGL in its settings.";
+    const more = left > 0 ? `${plural(left, "more estimator")} in the plots and the table: ${MOST_PANES} panes are the most a browser draws smoothly.` : "";
+    note.textContent = hasWebGL ? more : `This browser draws no WebGL, so plans take the place of the 3D panes. Hardware acceleration or WebGL in its settings bring them back. ${more}`;
+    sift();
+    label();
+    unveil();
   }
 
   function label() {
     const { algorithms, job, result, vehicle } = store.state;
     for (const [name, pane] of panes) {
+      if (name === OVERLAY) {
+        const shown = (job?.algorithms ?? []).filter((a) => !store.state.hidden.algorithms.has(a));
+        const titles = shown.map((a) => el("span", { class: "laid" }, lineSample(a, algorithms ?? []), algorithms?.find((b) => b.name === a)?.title ?? a));
+        pane.title.replaceChildren(...titles);
+        pane.frame.title = "3D pane of all estimators";
+        continue;
+      }
       const known = algorithms?.find((a) => a.name === name);
       pane.title.replaceChildren(known?.title ?? name, lineSample(name, algorithms ?? []));
       pane.root.style.setProperty("--stroke", lineStyle(name, algorithms ?? []).colour);
-      pane.frame.title = `3D pane of ${known?.title ?? name}`;
+      if (pane.frame) pane.frame.title = `3D pane of ${known?.title ?? name}`;
       const metrics = result?.algorithms[name]?.subjects[vehicle];
       pane.verdict.replaceChildren(...(metrics ? [verdictChip(metrics)] : []));
       pane.tag.hidden = !known?.centralized;
@@ -60,7 +74,7 @@ export function mountPanes(keys) {
   }
 
   function read() {
-    for (const [name, pane] of panes) say(pane.reading, reading(name, pane));
+    for (const [name, pane] of panes) if (name !== OVERLAY) say(pane.reading, reading(name, pane));
   }
 
   /** A pane is unveiled when its frame is there and there is something to see in it. */
@@ -68,20 +82,21 @@ export function mountPanes(keys) {
     const { job, view, live } = store.state;
     for (const [name, pane] of panes) {
       if (pane.root.dataset.state === "failed") continue;
-      const estimates = Boolean(view?.algorithms[name] || live?.algorithms[name]);
+      const told = { ...live?.algorithms, ...view?.algorithms };
+      const estimates = name === OVERLAY ? Object.keys(told).length > 0 : Boolean(told[name]);
       const ended = job !== null && !atWork(job) && job.state !== "done";
       pane.root.dataset.state = pane.loaded && estimates ? "shown" : "waiting";
-      say(pane.veil, ended ? "No estimates were made." : estimates ? "Opening the 3D pane…" : (WAITING[job?.state] ?? "Reading the run…"));
+      say(pane.veil, ended ? "No estimates were made." : estimates ? "Opening the pane…" : (WAITING[job?.state] ?? "Reading the run…"));
     }
   }
 
-  function sift({ hidden }) {
-    for (const [name, pane] of panes) pane.root.hidden = hidden.algorithms.has(name);
+  function sift() {
+    for (const [name, pane] of panes) pane.root.hidden = store.state.hidden.algorithms.has(name);
     grid.dataset.count = String([...panes.values()].filter((pane) => !pane.root.hidden).length);
   }
 
-  store.watch(["job"], ({ job }) => arrange(job));
-  store.watch(["job", "hidden"], sift);
+  store.watch(["job", "hidden"], arrange);
+  paneState.watch(["layout"], arrange);
   store.watch(["job", "algorithms", "result", "vehicle", "view", "live"], label);
   store.watch(["job", "view", "live"], unveil);
   clock.watch(read);
@@ -92,7 +107,7 @@ export function mountPanes(keys) {
     place(addresses) {
       for (const [name, pane] of panes) {
         const address = addresses[name];
-        if (!address) continue;
+        if (!address || !pane.frame) continue;
         pane.root.dataset.state = "waiting";
         if (pane.frame.getAttribute("src") !== address) {
           pane.loaded = false;
@@ -101,9 +116,20 @@ export function mountPanes(keys) {
         unveil();
       }
     },
+    /** What is on the screen: {root, title, reading, picture: canvas} of every pane that shows something. */
+    shown() {
+      const seen = [...panes.values()].filter((pane) => !pane.root.hidden && pane.root.dataset.state === "shown");
+      return seen.map(({ root, title, reading, frame, plan }) => ({
+        root,
+        title: title.innerText.trim().replace(/\s*\n\s*/g, " · "),
+        reading: reading.textContent,
+        picture: plan?.canvas ?? sceneOf(frame),
+      }));
+    },
     /** The scene server cannot draw: why. */
     fail(detail) {
       for (const pane of panes.values()) {
+        if (pane.plan) continue;
         pane.root.dataset.state = "failed";
         pane.veil.textContent = detail;
       }
@@ -116,27 +142,34 @@ const WAITING = {
   running: "The mission is under way; estimates come as they are made…",
 };
 
-function build(name, keys, unveil) {
+function build(name, flat, keys, unveil) {
   const title = el("h3", {});
   const verdict = el("span", { class: "judged" });
   const reading = el("span", { class: "reading" });
   const tag = el("span", { class: "tag", hidden: true }, "benchmark");
-  const frame = el("iframe", { title: name, allow: "" });
+  const frame = flat ? null : el("iframe", { title: name, allow: "" });
+  const plan = flat ? planPane(() => [name], `Plan of ${name}`) : null;
   const veil = el("div", { class: "veil" });
   const root = el(
     "article",
     { class: "pane", "data-algorithm": name, "data-state": "waiting" },
     el("header", {}, title, verdict, reading, tag),
-    el("div", { class: "view" }, frame, veil),
+    el("div", { class: "view" }, frame ?? plan.canvas, veil),
   );
-  const pane = { root, title, verdict, reading, tag, frame, veil, loaded: false };
-  frame.addEventListener("load", () => {
+  const pane = { root, title, verdict, reading, tag, frame, plan, veil, loaded: flat };
+  frame?.addEventListener("load", () => {
     if (!frame.getAttribute("src")) return;
     pane.loaded = true;
     keys(frame.contentWindow);
     unveil();
   });
   return pane;
+}
+
+/** The canvas that a frame draws its scene on; null where it is not there yet. */
+function sceneOf(frame) {
+  const all = frame.contentDocument?.querySelectorAll("canvas") ?? [];
+  return [...all].find((canvas) => canvas.width > 0 && canvas.height > 0) ?? null;
 }
 
 /** Error and sigma of the chosen vehicle in the trial that is drawn, now. */

@@ -1,36 +1,74 @@
-// Above the panes: whose curves to read, and what the panes draw.
+// Above the panes: whose curves to read, what the panes draw and how, pictures and films of them.
 
 import { el, part } from "../look/dom.js";
-import { vehicleColour } from "../look/palette.js";
+import { darkScheme, lineStyle, vehicleColour } from "../look/palette.js";
 import { dot } from "../look/swatch.js";
 import { schedulers } from "../pursuit/story.js";
 import { tellers } from "../smoothing/story.js";
+import { LAYOUTS, hasWebGL, paneState } from "../state/panes.js";
 import { store } from "../state/store.js";
+import { takings } from "./takings.js";
 
-const OPTIONS = {
-  trails: { label: "Trails", on: true, hint: "Estimated tracks up to now" },
-  ellipses: { label: "Ellipses", on: true, hint: "95 % ellipses along the track" },
-  rays: { label: "Rays", on: true, hint: "Packets: the sender's colour when heard, grey when lost" },
-  graph: { label: "Graph", on: false, hint: "Factor graph of the chosen vehicle, smoothed: received poses solid, lost ones hollow, priors square, composed links as arcs" },
-  pursuit: { label: "Formation", on: true, hint: "Waypoints, the formation kept and the one wanted (dashed), messages under way, and what the chosen vehicle knows: hyperbolas of equal time difference with two sigmas on either side" },
-  follow: { label: "Follow", on: false, hint: "Keep the chosen vehicle in the middle" },
-  top: { label: "From above", on: false, hint: "Look straight down, north up" },
+const TOGGLES = {
+  trails: { label: "Trails", hint: "Estimated tracks up to now" },
+  ellipses: { label: "Ellipses", hint: "Ellipses along the track; their size is under View" },
+  rays: { label: "Rays", hint: "Packets: the sender's colour when heard, grey when lost" },
+  graph: { label: "Graph", hint: "Factor graph of the chosen vehicle, smoothed: received poses solid, lost ones hollow, priors square, composed links as arcs" },
+  pursuit: { label: "Formation", hint: "Waypoints, the formation kept and the one wanted (dashed), messages under way, and what the chosen vehicle knows: hyperbolas of equal time difference with two sigmas on either side" },
+  follow: { label: "Follow", hint: "Keep the chosen vehicle in the middle" },
+  top: { label: "From above", hint: "Look straight down, north up", solid: true },
 };
+const MORE = {
+  cloud: { label: "All trials", hint: "Every trial's estimate as a point about the truth drawn, and the envelope of 90 % of them along the track", solid: true, trials: true },
+  contours: { label: "Densities", hint: "Lines of equal density of all trials, which hold 50 and 90 % of them", solid: true, trials: true },
+  linked: { label: "Cameras linked", hint: "Panes turn together; unticked each by itself", solid: true },
+};
+const SIZES = { 95: "95 %", 1: "1 σ", 2: "2 σ", 3: "3 σ" };
+const DEPTHS = { 0: "as suits", 1: "true", 2: "× 2", 5: "× 5", 10: "× 10", 20: "× 20" };
 
-export function mountToolbar(session) {
+export function mountToolbar(session, panes) {
   const vehicles = el("div", { class: "vehicles", role: "radiogroup", "aria-label": "Vehicle" });
   const boxes = {};
-  const tell = () => {
-    const chosen = Object.fromEntries(Object.entries(boxes).map(([name, box]) => [name, box.checked]));
-    const named = (on) => (on ? store.state.vehicle : null);
-    const hidden = [...store.state.hidden.vehicles];
-    session.options({ ...chosen, hidden, follow: named(chosen.follow), graph: named(chosen.graph), pursuit: named(chosen.pursuit) });
-  };
-  const toggles = Object.entries(OPTIONS).map(([name, { label, on, hint }]) => {
-    boxes[name] = el("input", { type: "checkbox", name: `pane-${name}`, checked: on, onchange: tell });
+  const toggle = ([name, { label, hint }]) => {
+    boxes[name] = el("input", { type: "checkbox", name: `pane-${name}`, onchange: () => paneState.set({ [name]: boxes[name].checked }) });
     return el("label", { class: "toggle", title: hint }, boxes[name], label);
-  });
-  part("toolbar").append(vehicles, key(), el("div", { class: "toggles", role: "group", "aria-label": "Panes show" }, toggles));
+  };
+  const layout = select("Panes", LAYOUTS, (value) => paneState.set({ layout: value }));
+  const sigma = select("Size of the ellipses", SIZES, (value) => paneState.set({ sigma: Number(value) }));
+  const depth = select("Depths stretched", DEPTHS, (value) => paneState.set({ depth: Number(value) }));
+  for (const option of layout.options) option.disabled = !hasWebGL && option.value !== "plan";
+  const row = (label, node, hint) => el("label", { class: "choice", title: hint }, el("span", {}, label), node);
+  const menu = el(
+    "details",
+    { class: "view-menu" },
+    el("summary", {}, "View"),
+    el(
+      "div",
+      { class: "sheet" },
+      row("Ellipses", sigma, "How large ellipses are drawn"),
+      row("Depths", depth, "How much deeper than true things are drawn"),
+      Object.entries(MORE).map(toggle),
+      takings(session, panes),
+    ),
+  );
+  menu.addEventListener("keydown", (event) => event.key === "Escape" && ((menu.open = false), menu.firstChild.focus()));
+  document.addEventListener("pointerdown", (event) => !menu.contains(event.target) && (menu.open = false));
+  const size = el("span", {});
+  part("toolbar").append(
+    vehicles,
+    key(size),
+    el("div", { class: "toggles", role: "group", "aria-label": "Panes show" }, Object.entries(TOGGLES).map(toggle), layout, menu),
+  );
+
+  const tell = () => {
+    const { trails, ellipses, rays, sigma, cloud, contours, top, linked, depth, follow, graph, pursuit } = paneState.state;
+    const { vehicle, hidden, job, algorithms } = store.state;
+    const named = (on) => (on ? vehicle : null);
+    const laid = (job?.algorithms ?? []).filter((name) => !hidden.algorithms.has(name));
+    const colours = Object.fromEntries(laid.map((name) => [name, rgb(lineStyle(name, algorithms ?? []).colour)]));
+    const dark = darkScheme.matches;
+    session.options({ trails, ellipses, rays, sigma, cloud, contours, top, linked, depth, dark, colours, hidden: [...hidden.vehicles], follow: named(follow), graph: named(graph), pursuit: named(pursuit) });
+  };
 
   let drawn = "";
   store.watch(["view", "live", "vehicle"], ({ view, live, vehicle }) => {
@@ -43,12 +81,41 @@ export function mountToolbar(session) {
     }
     for (const input of vehicles.querySelectorAll("input")) input.checked = input.value === vehicle;
   });
-  store.watch(["hidden"], tell);
+  paneState.watch(["trails", "ellipses", "rays", "graph", "pursuit", "follow", "top", "sigma", "cloud", "contours", "linked", "depth", "layout"], (now) => {
+    for (const [name, box] of Object.entries(boxes)) box.checked = now[name];
+    layout.value = now.layout;
+    sigma.value = String(now.sigma);
+    depth.value = String(now.depth);
+    size.textContent = SIZES[now.sigma];
+    for (const [name, { solid }] of Object.entries({ ...TOGGLES, ...MORE })) if (solid) boxes[name].parentElement.hidden = now.layout === "plan";
+    depth.parentElement.hidden = now.layout === "plan";
+    tell();
+  });
+  store.watch(["hidden", "algorithms", "job"], tell);
   store.watch(["vehicle"], () => (boxes.follow.checked || boxes.graph.checked || boxes.pursuit.checked) && tell());
   store.watch(["view"], ({ view }) => {
     boxes.graph.parentElement.hidden = !tellers(view).length;
     boxes.pursuit.parentElement.hidden = !schedulers(view).length;
   });
+  store.watch(["job"], ({ job }) => {
+    const many = (job?.trials ?? 1) > 4 && job?.state === "done";
+    for (const [name, { trials }] of Object.entries(MORE)) if (trials) boxes[name].disabled = !many;
+  });
+  darkScheme.addEventListener("change", tell);
+}
+
+function select(label, choices, act) {
+  const list = el("select", { "aria-label": label, onchange: () => act(list.value) }, order(choices).map(([value, text]) => el("option", { value }, text)));
+  return list;
+}
+
+/** Entries in the order written, also where the keys are numbers: 95 % first, then the sigmas. */
+function order(choices) {
+  return Object.entries(choices).sort(([a], [b]) => (b === "95") - (a === "95"));
+}
+
+function rgb(colour) {
+  return [1, 3, 5].map((n) => parseInt(colour.slice(n, n + 2), 16));
 }
 
 function choice({ name, kind }, n) {
@@ -62,7 +129,7 @@ function choice({ name, kind }, n) {
   );
 }
 
-function key() {
+function key(size) {
   const line = (kind, text) => el("span", { class: "key" }, el("i", { class: kind, "aria-hidden": "true" }), text);
-  return el("div", { class: "keys" }, line("truth", "truth"), line("estimate", "estimate"), line("ellipse", "95 %"));
+  return el("div", { class: "keys" }, line("truth", "truth"), line("estimate", "estimate"), line("ellipse", size));
 }

@@ -111,7 +111,8 @@ def test_without_webgl_the_rest_remains(context: BrowserContext, run: str, keep)
     page = context.new_page()
     page.goto(f"/#run={run}")
     expect(page.locator("#panes .note")).to_contain_text("WebGL")
-    expect(page.locator(".pane")).to_have_count(0)
+    expect(page.locator(".pane[data-state=shown] canvas.plan")).to_have_count(3)
+    assert page.locator("iframe").count() == 0
     for quantity in ("sigma_m", "error_m"):
         expect(page.locator(f".plot[data-quantity={quantity}] .js-line")).to_have_count(3)
     expect(page.locator("#table tbody tr")).to_have_count(6)
