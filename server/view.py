@@ -20,6 +20,8 @@ from server.wire import rounded
 TIMES = 800
 #: Innovations are averaged over this many spans of the mission.
 SPANS = 80
+#: A gap longer than this (s) begins a new run of fixes.
+FIX_GAP_S = 30.0
 #: The percentiles over trials that are shown: the middle one and a band.
 BAND = (0.05, 0.5, 0.95)
 
@@ -48,8 +50,23 @@ def build(outline: dict[str, Any], parts: Parts, names: Sequence[str]) -> dict[s
         "nees_interval_alone": list(nees_interval(1)),
         "band": list(BAND),
         "differences": _differences(told, trials),
-        "events": outline["events"],
+        "events": _events(outline["events"]),
     }
+
+
+def _events(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What happened, in order; fixes of a subject that follow each other within FIX_GAP_S as one, until `until_s`."""
+    told: list[dict[str, Any]] = []
+    latest: dict[str, dict[str, Any]] = {}
+    for event in events:
+        last = latest.get(event["subject"]) if event["kind"] == "fix" else None
+        if last is not None and event["time_s"] - last["until_s"] <= FIX_GAP_S:
+            last["until_s"] = event["time_s"]
+            continue
+        if event["kind"] == "fix":
+            event = latest[event["subject"]] = event | {"until_s": event["time_s"]}
+        told.append(event)
+    return told
 
 
 def _trials(parts: Parts, name: str) -> list[int]:

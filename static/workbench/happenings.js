@@ -1,7 +1,5 @@
 // What happened when: packets and fixes of the trial that is drawn, as marks and moments to step to.
 
-/** A gap longer than this (s) begins a new run of fixes. */
-const FIX_GAP_S = 30;
 /** Fixes over more than this share of the mission are no event: the vehicle has them always. */
 const ALWAYS = 0.8;
 
@@ -15,29 +13,16 @@ export function happenings(view, hidden) {
   const heard = packets.filter((p) => p.heard);
   const lost = packets.filter((p) => !p.heard);
   const length_s = (view.time_s.at(-1) ?? 0) - (view.time_s[0] ?? 0);
-  const fixes = runs(events.filter((e) => e.kind === "fix")).filter((f) => f.to_s - f.from_s < ALWAYS * length_s);
+  const fixes = events
+    .filter((e) => e.kind === "fix")
+    .map((e) => ({ subject: e.subject, from_s: e.time_s, to_s: e.until_s ?? e.time_s }))
+    .filter((f) => f.to_s - f.from_s < ALWAYS * length_s);
   const moments = [
     ...heard.map((p) => ({ time_s: p.toa_s, words: `${p.from} → ${p.to} heard` })),
     ...lost.map((p) => ({ time_s: p.tol_s, words: `${p.from} → ${p.to} lost` })),
     ...fixes.map((f) => ({ time_s: f.from_s, words: `${f.subject} gets fixes` })),
   ];
   return { heard, lost, fixes, moments: together(moments.sort((a, b) => a.time_s - b.time_s)) };
-}
-
-/** Fixes that follow each other closely as one. */
-function runs(fixes) {
-  const open = new Map();
-  const found = [];
-  for (const { subject, time_s } of fixes) {
-    const last = open.get(subject);
-    if (last && time_s - last.to_s <= FIX_GAP_S) last.to_s = time_s;
-    else {
-      const run = { subject, from_s: time_s, to_s: time_s };
-      open.set(subject, run);
-      found.push(run);
-    }
-  }
-  return found;
 }
 
 /** Moments at the same time as one. */

@@ -17,7 +17,7 @@ const SUBJECT = [
   ["σ", "m", "Fourth root of the xy covariance's determinant, mean over trials and time", (m) => number(m.sigma_m), "sigma_m"],
   ["Final σ", "m", "The same at the end", (m) => number(m.final_sigma_m), "final_sigma_m"],
   ["ANEES", "", "Normalized error squared, averaged: 2 is right; below, where it is at 95 % of the times if it is", (m) => number(m.anees)],
-  ["Verdict", "", "Whether its confidence can be believed", (m) => verdictChip(m)],
+  ["Verdict", "", "Whether its confidence can be believed", (m, id) => named(verdictChip(m), `verdict-${id}`)],
   ["Deviation", "m", "Largest distance between its mean and the centralized benchmark's", (m) => number(m.max_deviation_m)],
 ];
 
@@ -169,7 +169,7 @@ function body(rows, comparison) {
   const span = { rowspan: rows.length };
   const tags = [known?.centralized ? "benchmark" : null, name === baseline ? "baseline" : null].filter(Boolean);
   const cell = (row) => ([, , , write, key]) => {
-    if (key !== figure || !(row.best || row.level)) return el("td", {}, write(row.metrics));
+    if (key !== figure || !(row.best || row.level)) return el("td", {}, write(row.metrics, `${name}-${row.subject}`));
     const hint = row.best ? `The least ${FIGURES[figure].label} of the estimators shown that could fly` : `Not significantly more than ${comparison.title(row.level)}'s, the least`;
     return el("td", { class: row.best ? "best" : "level", "data-hint": hint }, el("span", { class: "rank" }, row.best ? "★ " : "≈ "), write(row.metrics));
   };
@@ -189,6 +189,12 @@ function body(rows, comparison) {
       ),
     ),
   );
+}
+
+/** What has an id keeps the focus when the table is drawn anew. */
+function named(node, id) {
+  node.id = id;
+  return node;
 }
 
 function difference({ difference: found }, { figure, title, baseline, trials }) {

@@ -95,3 +95,20 @@ def test_one_trial_has_neither_bands_nor_intervals(parts):
     assert told["algorithms"]["nekf"]["subjects"]["scout"]["band"] == {"error_m": None, "sigma_m": None}
     mean, half = told["differences"]["sigma_m"]["scout"]["nekf"]["dead_reckoning"]
     assert mean < 0 and half is None
+
+
+def test_fixes_that_follow_each_other_are_told_as_one(parts):
+    def fix(subject: str, time_s: float) -> dict[str, object]:
+        return {"kind": "fix", "subject": subject, "time_s": time_s}
+
+    scenario, found = parts
+    packet = {"kind": "packet", "from": "scout", "to": "ship", "tol_s": 5.0, "toa_s": 5.1, "heard": True}
+    events = [fix("ship", 0.0), fix("scout", 0.0), packet, fix("ship", 20.0), fix("ship", 50.0), fix("ship", 81.0)]
+    seen = view.build(work.outline(scenario) | {"events": events}, found, NAMES)["events"]
+    assert seen == [
+        fix("ship", 0.0) | {"until_s": 50.0},
+        fix("scout", 0.0) | {"until_s": 0.0},
+        packet,
+        fix("ship", 81.0) | {"until_s": 81.0},
+    ]
+    assert "until_s" not in events[0], "what the mission told stays as it is"
