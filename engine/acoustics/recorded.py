@@ -60,7 +60,9 @@ def _samples(path: Path, sonar: Sonar, key: str, channel: int) -> np.ndarray:
         if suffix == ".wav":
             found = _wav(path, sonar, key, channel)
         elif suffix == ".npy":
-            found = np.load(path, allow_pickle=False)
+            found = np.load(path, mmap_mode="r", allow_pickle=False)  # no memory for what a header only promises
+            if not isinstance(found, np.ndarray):
+                raise ValueError("it is an archive of several arrays")
         else:
             found = np.loadtxt(path, delimiter=",", ndmin=1).ravel()
     except (OSError, ValueError, EOFError, struct.error) as error:

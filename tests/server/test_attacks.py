@@ -12,6 +12,7 @@ import io
 import pickle
 import socket
 import ssl
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from pathlib import Path
@@ -34,6 +35,7 @@ from tests.server.living import PATIENCE_S, SHORT, Live, start, until
 TOKEN = "a-token-of-at-least-24-letters"
 MIB = 2**20
 JSON, TOML = {"content-type": "application/json"}, {"content-type": "application/toml"}
+CSV = {"content-type": "text/csv"}
 BINARY, ZIPPED = {"content-type": "application/octet-stream"}, JSON | {"content-encoding": "gzip"}
 EVIL = {"origin": "http://evil.example"}
 
@@ -52,6 +54,20 @@ def with_set(key: str, value: str) -> str:
 def with_algorithm(name: str) -> str:
     return f'{{"scenario": "first-look", "algorithms": ["{name}"]}}'
 
+
+def zip_bomb() -> bytes:
+    """An archive a thousandth the size of what is in it."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("x.csv", bytes(16 * MIB))
+    return packed.getvalue()
+
+
+ZIP_BOMB = zip_bomb()
+RECORDED = """{"scenario": {"schema": 1, "title": "x", "family": "navigation", "algorithms": ["cekf"],
+"mission": {"kind": "recorded", "format": "csv", "log": "%s",
+"odometry": [{"vehicle": "a", "file": "passwd.csv", "time": "t", "forward": "f", "turn": "w"}]},
+"vehicles": [{"name": "a", "kind": "auv", "initial": {"position_sigma_m": 1}, "sensors": {}}]}}"""
 
 ATTACKS = [
     # what is tried, method, path, headers, body, answers
@@ -98,6 +114,16 @@ ATTACKS = [
     ("a pickle as a scenario", "PUT", "/api/scenarios/mine", BINARY, pickle.dumps({}), {415, 422}),
     ("code named as an algorithm", "POST", "/api/jobs", JSON, with_algorithm("os:system"), {422}),
     ("a file named as an algorithm", "POST", "/api/jobs", JSON, with_algorithm("/tmp/x.py"), {422}),
+    ("a log whose name is a path", "PUT", "/api/logs/..%2fevil/x.csv", CSV, "a,b\n1,2\n", {404, 405, 422}),
+    ("a log's file whose name is a path", "PUT", "/api/logs/mine/..%2f..%2fx.csv", CSV, "a\n1\n", {404, 405, 422}),
+    ("a log's file that is hidden", "PUT", "/api/logs/mine/.x.csv", CSV, "a\n1\n", {422}),
+    ("a program as a log's file", "PUT", "/api/logs/mine/x.py", CSV, "import os\n", {422}),
+    ("a scenario as a log's file", "PUT", "/api/logs/mine/scenario.toml", TOML, "schema = 1\n", {422}),
+    ("a zip bomb as a log's file", "PUT", "/api/logs/mine/x.csv", CSV, ZIP_BOMB, {422}),
+    ("a pickle as a log's file", "PUT", "/api/logs/mine/x.csv", CSV, pickle.dumps({}), {422}),
+    ("a log's file too large", "PUT", "/api/logs/mine/x.csv", CSV | {"content-length": str(10**12)}, "", {413}),
+    ("a log read from elsewhere", "POST", "/api/jobs", JSON, RECORDED % "../../../etc", {404, 422}),
+    ("the same, from the root", "POST", "/api/jobs", JSON, RECORDED % "/etc", {404, 422}),
     ("a method that is none", "TRACE", "/", {}, "", {405}),
 ]  # fmt: skip
 
@@ -323,6 +349,25 @@ def test_a_link_among_the_saved_scenarios_is_not_followed(live: Live, tmp_path: 
         assert outside.read_text() == text and not (shelf / "linked.toml").is_symlink()
     finally:
         (shelf / "linked.toml").unlink()
+
+
+def test_a_link_among_the_uploaded_logs_is_not_followed(live: Live, tmp_path: Path):
+    shelf = live.settings.data / "scenarios"
+    shelf.mkdir(exist_ok=True)
+    (tmp_path / "x.csv").write_text("private\n1\n")
+    (shelf / "linked-log").symlink_to(tmp_path)
+    (shelf / "own-log").mkdir()
+    (shelf / "own-log" / "x.csv").symlink_to(tmp_path / "x.csv")
+    try:
+        assert live.http.get("/api/logs/linked-log").status_code == 404
+        assert live.http.put("/api/logs/linked-log/y.csv", content="a\n1\n").status_code == 403
+        assert live.http.put("/api/logs/own-log/x.csv", content="a\n1\n").status_code == 403
+        assert "private" not in live.http.get("/api/logs/own-log").text
+        assert (tmp_path / "x.csv").read_text() == "private\n1\n" and not (tmp_path / "y.csv").exists()
+    finally:
+        (shelf / "linked-log").unlink()
+        (shelf / "own-log" / "x.csv").unlink()
+        (shelf / "own-log").rmdir()
 
 
 class Bomb:

@@ -49,6 +49,11 @@ def test_faults_are_named(tmp_path, sound):
     np.save(tmp_path / "rows.npy", records)
     np.save(tmp_path / "nan.npy", np.full(8000, np.nan))
     np.save(tmp_path / "objects.npy", np.array([{}], dtype=object), allow_pickle=True)
+    np.savez(tmp_path / "archive.npz", whole)
+    (tmp_path / "archive.npz").rename(tmp_path / "archive.npy")
+    np.save(tmp_path / "promise.npy", np.zeros(9))
+    promise = (tmp_path / "promise.npy").read_bytes().replace(b"(9,), }" + b" " * 13, b"(9" + b"0" * 13 + b",), }")
+    (tmp_path / "promise.npy").write_bytes(promise)
     (tmp_path / "sea.mp3").write_bytes(b"")
     (tmp_path / "broken.wav").write_bytes(b"RIFF")
     for name, starts, words in (
@@ -56,6 +61,8 @@ def test_faults_are_named(tmp_path, sound):
         ("rows.npy", STARTS[:2], "3 records"),
         ("nan.npy", STARTS[:1] * 0, "not finite"),
         ("objects.npy", STARTS, "cannot be read"),
+        ("archive.npy", STARTS, "archive of several"),
+        ("promise.npy", STARTS, "cannot be read"),
         ("sea.mp3", STARTS, "no kind of file"),
         ("broken.wav", STARTS, "cannot be read"),
         ("absent.wav", STARTS, "cannot be read"),
