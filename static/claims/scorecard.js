@@ -15,7 +15,7 @@ import { figuresOf, verdictOf } from "./words.js";
 export function mountScorecard() {
   const room = part("claims-room");
   const sum = el("p", { class: "quiet-inline", role: "status" });
-  const all = el("button", { type: "button", class: "primary", id: "measure-all", onclick: () => measure([...cards.values()].map((c) => c.mission)) }, "Measure all that is not");
+  const all = el("button", { type: "button", class: "primary", id: "measure-all", disabled: true, onclick: () => measure([...cards.values()].map((c) => c.mission)) }, "Measure all that is not");
   const trouble = el("p", { class: "refusal", role: "alert", hidden: true });
   const list = el("div", { class: "papers" });
   const cards = new Map();
@@ -26,7 +26,7 @@ export function mountScorecard() {
     cards.clear();
     const papers = [...byPaper(missions)].map(([paper, members]) => {
       const score = el("span", { class: "score" });
-      const button = el("button", { type: "button", class: "small", "aria-label": `Measure the claims of ${paper}`, onclick: () => measure(members) }, "Measure");
+      const button = el("button", { type: "button", class: "small", "aria-label": `Measure the claims of ${paper}`, disabled: true, onclick: () => measure(members) }, "Measure");
       const built = members.map((mission) => card(mission));
       built.forEach((c) => cards.set(c.mission.name, c));
       const section = el("section", { class: "card paper", "aria-label": paper }, el("div", { class: "room-tools" }, el("h2", {}, paper), score, el("span", { class: "spring" }), button), built.map((c) => c.root));
@@ -92,7 +92,7 @@ export function mountScorecard() {
 
   function card(mission) {
     const state = el("span", { class: "score" });
-    const again = el("button", { type: "button", class: "small", "aria-label": `Measure ${mission.title}`, onclick: () => measure([mission]) }, "Measure");
+    const again = el("button", { type: "button", class: "small", "aria-label": `Measure ${mission.title}`, disabled: true, onclick: () => measure([mission]) }, "Measure");
     const claims = el("ul", { class: "claim-list" });
     const root = el("details", { class: "mission-claims", "data-mission": mission.name }, el("summary", {}, el("span", { class: "title" }, mission.title), state), el("div", { class: "room-tools" }, el("a", { href: `#${new URLSearchParams({ mission: mission.name })}` }, "The mission"), again), claims);
     const built = { mission, root, evidence: [], busy: false, fill };

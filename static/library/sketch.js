@@ -1,4 +1,4 @@
-// A small picture of a mission: the paths of its vehicles, drawn from the scenario.
+// A small picture of a mission, drawn from its scenario: paths of vehicles, ellipses of sensors, places in a formation.
 
 import { svg } from "../look/dom.js";
 import { vehicleColour } from "../look/palette.js";
@@ -47,10 +47,56 @@ function points(vehicle) {
   return draw ? draw(vehicle.path) : [];
 }
 
-/** An SVG of the scenario's paths, or of a recording where there are none to draw. */
+const ring = ([rx, ry], degrees = 0) =>
+  Array.from({ length: 49 }, (_, n) => turn([rx * Math.cos((n / 24) * Math.PI), ry * Math.sin((n / 24) * Math.PI)], degrees));
+
+/** Lines of a scenario in metres, one for each vehicle or sensor; a single point for what stays. */
+const LINES = {
+  tracking: ({ sensors = [] }) => [
+    [[0, 0]],
+    ...sensors.map(({ ellipse, variance_m2 }) =>
+      ellipse ? ring([Math.sqrt(ellipse.along_m2), Math.sqrt(ellipse.across_m2)], ellipse.angle_deg) : ring([Math.sqrt(variance_m2), Math.sqrt(variance_m2)]),
+    ),
+  ],
+  pursuit: ({ target, formation }) => {
+    if (!formation) return [];
+    const length = formation.length_m ?? 1;
+    const places = (FORMATIONS[formation.kind] ?? formation.offsets_m).map(([x, y]) => [x * length, y * length]);
+    const wander = Array.from({ length: 33 }, (_, n) => [(n / 16 - 2) * length, 0.25 * length * Math.sin((n * Math.PI) / 16)]);
+    return [wander.reverse(), ...places.map((place) => [place])].map((line) => line.map((point) => plus(target.start_m ?? [0, 0], point)));
+  },
+  slam: ({ vehicle, beacon, vehicles = [] }) => [vehicle, beacon, ...vehicles].filter(Boolean).map(points),
+};
+
+/** Places about the target, in lengths of the formation (C19 Fig. 3-5). */
+const FORMATIONS = {
+  inner: [
+    [0, 1],
+    [-0.87, -0.5],
+    [0.87, -0.5],
+  ],
+  outer: [
+    [-0.5, -0.7],
+    [0.5, -0.7],
+    [0, -1.58],
+  ],
+  line: [
+    [-0.67, -0.8],
+    [0, -0.93],
+    [0.67, -0.8],
+  ],
+};
+
+function linesOf(scenario) {
+  if (!scenario) return [];
+  const lines = LINES[scenario.family]?.(scenario) ?? [];
+  return lines.some((line) => line.length) ? lines : (scenario.vehicles ?? []).map(points);
+}
+
+/** An SVG of the scenario, or the sign of a recording where there is nothing to draw. */
 export function sketch(scenario, width, height) {
   const drawing = svg("svg", { class: "sketch", viewBox: `0 0 ${width} ${height}`, width, height, "aria-hidden": "true" });
-  const paths = (scenario?.vehicles ?? []).map(points);
+  const paths = linesOf(scenario);
   const all = paths.flat();
   if (!all.length) {
     if (scenario) drawing.append(recording(width, height));
@@ -69,6 +115,7 @@ export function sketch(scenario, width, height) {
     const colour = vehicleColour(n);
     const line = { points: path.map((p) => place(p).join(",")).join(" "), stroke: colour };
     if (path.length > 1) drawing.append(svg("polyline", line));
+    if (scenario.family === "tracking" && path.length > 1) return;
     const [cx, cy] = place(path[0]);
     const r = Math.max(1.8, height / 40);
     drawing.append(svg("circle", { cx, cy, r, fill: colour }));
