@@ -32,8 +32,14 @@ LOOK_S = 0.5
 GRACE_S = 0.6
 STOP_POLL_S = 0.1
 #: Dask makes glibc give memory back at once, which costs arrays of many megabytes a third of their speed. A worker that
-#: reaches its memory limit is ended, not slowed down.
+#: reaches its memory limit is ended, not slowed down. What Dask remembers for its own dashboard, estimates told by our
+#: runs among it, fills memory; nobody looks at it here.
 PROCESSES = {
+    "distributed.admin.log-length": 500,
+    "distributed.admin.low-level-log-length": 50,
+    "distributed.diagnostics.computations.max-history": 5,
+    "distributed.diagnostics.erred-tasks.max-history": 5,
+    "distributed.worker.profile.enabled": False,
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
     "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
     "distributed.worker.memory.target": False,

@@ -6,6 +6,7 @@ import ctypes
 import os
 import signal
 import threading
+import time
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -22,6 +23,9 @@ from engine.tracks import Reference, Tracks
 
 #: What a shard's run answers, or a batch's.
 Answer = tuple[Reference, Tracks] | Totals
+
+#: A run tells at most this often how far it is: every word goes through the server.
+TELL_S = 0.25
 
 _lock = threading.Lock()
 _at_work: dict[str, int] = {}
@@ -91,13 +95,21 @@ def run(topic: str, key: str, piece: Piece) -> Answer | None:
     """Run a piece under a key and tell of it on a topic; None where it was stopped.
 
     Told are {"job", "number", "algorithm", "fraction", "partial", "outline"}: estimates and the outline of the
-    mission come from the shards of trial 0 alone.
+    mission come from the shards of trial 0 alone, and how far the others are is told every TELL_S.
     """
     worker = get_worker()
     shard = piece.shard
     watched = shard.trials[0] == 0
+    next_s = 0.0
 
     def tell(fraction: float, partial: Any = None, *, outline: Any = None) -> None:
+        nonlocal next_s
+        moment = time.monotonic()
+        if not watched and moment < next_s:
+            if key in _stopped:
+                raise Stopped
+            return
+        next_s = moment + TELL_S
         message = {
             "job": piece.job,
             "number": piece.number,

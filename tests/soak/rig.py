@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -30,6 +31,7 @@ class Service:
     def __init__(self, name: str, module: str, *arguments: str) -> None:
         self.name = name
         self._command = [sys.executable, "-m", module, *arguments]
+        self._lock = threading.Lock()
         self.process = self._start()
 
     def _start(self) -> subprocess.Popen[bytes]:
@@ -39,13 +41,15 @@ class Service:
 
     def kill(self) -> None:
         """End it as a power cut would: it alone, and at once."""
-        self.process.kill()
-        self.process.wait()
+        with self._lock:
+            self.process.kill()
+            self.process.wait()
 
     def look_after(self) -> None:
         """Start it again if it has ended."""
-        if self.process.poll() is not None:
-            self.process = self._start()
+        with self._lock:
+            if self.process.poll() is not None:
+                self.process = self._start()
 
     def family(self) -> list[psutil.Process]:
         with contextlib.suppress(psutil.NoSuchProcess):
@@ -87,6 +91,15 @@ class Rig:
         serve = ["server", "serve", "--port", str(self.port), "--data", str(data), *where, *options]
         self.services = [Service("server", *serve), *helpers]
         self.http = httpx.Client(base_url=self.url, timeout=PATIENCE_S)
+        self._ending = threading.Event()
+        self._keeper = threading.Thread(target=self._keep, daemon=True)
+        self._keeper.start()
+
+    def _keep(self) -> None:
+        """Start again whatever has ended, as a service manager does."""
+        while not self._ending.wait(0.1):
+            for service in self.services:
+                service.look_after()
 
     @property
     def server(self) -> Service:
@@ -98,12 +111,10 @@ class Rig:
         return Live(self.url, self.http, None, None)  # type: ignore[arg-type]
 
     def ready(self) -> float:
-        """Wait until jobs can run, looking after everything; the seconds that took."""
+        """Wait until jobs can run; the seconds that took."""
         start = time.monotonic()
 
         def answers() -> bool:
-            for service in self.services:
-                service.look_after()
             with contextlib.suppress(httpx.TransportError):
                 return httpx.get(f"{self.url}/api/health/ready", timeout=5).status_code == 200
             return False
@@ -122,6 +133,8 @@ class Rig:
         return found
 
     def end(self) -> None:
+        self._ending.set()
+        self._keeper.join()
         self.http.close()
         for service in self.services:
             service.end()
