@@ -2,6 +2,7 @@
 
 import { el, part } from "../look/dom.js";
 import { darkScheme } from "../look/palette.js";
+import { loadPlotly } from "../look/plotly.js";
 import { clock } from "../state/clock.js";
 import { hover } from "../state/hover.js";
 import { keepInLink, noteLink } from "../state/link.js";
@@ -90,6 +91,8 @@ export function mountPlots() {
     if (!timer) timer = setTimeout(draw, store.state.view ? 0 : Math.max(0, drawnAt + REDRAW_MS - performance.now()));
   };
   store.watch(["job", "view", "live", "vehicle", "algorithms", "hidden"], soon);
+  // Plotly comes while the run is being read; where it cannot, the plots say so when they are to be drawn.
+  store.watch(["run"], ({ run }) => run !== null && loadPlotly().catch(() => {}));
   darkScheme.addEventListener("change", soon);
   zoom.watch(soon);
   const point = () => plots.forEach((plot) => plot.point());
