@@ -58,7 +58,7 @@ def as_it_was(opened: Page):
 
 
 def test_quantities_are_chosen_and_kept_in_the_address(opened: Page, keep):
-    expect(opened.locator(".plot")).to_have_count(4)
+    expect(opened.locator("#plots .plot")).to_have_count(4)
     chooser = opened.get_by_role("group", name="Plots")
     chooser.get_by_role("button", name="Bandwidth").click()
     chooser.get_by_role("button", name="NEES").click()
@@ -181,10 +181,10 @@ def test_a_span_in_the_address_is_shown(opened: Page, run: str):
     opened.locator(".plot .js-line").first.wait_for()
     expect(opened.locator(".whole")).to_be_visible()
     assert span(opened) == (400, 700) and now(opened) == 500
-    expect(opened.locator(".plot")).to_have_count(2)
+    expect(opened.locator("#plots .plot")).to_have_count(2)
     expect(plot(opened, "sigma_m").get_by_role("button", name="log")).to_have_attribute("aria-pressed", "true")
     opened.goto(f"/#run={run}")
-    expect(opened.locator(".plot")).to_have_count(4)
+    expect(opened.locator("#plots .plot")).to_have_count(4)
     assert span(opened) == (0, 1200)
 
 
