@@ -6,12 +6,12 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Error, Page, expect, sync_playwright
 
 from tests.browser.serving import Server
 
@@ -155,6 +155,18 @@ def opened(_opened: Page, run: str) -> Page:
     page.keyboard.press("End")
     page.evaluate("document.querySelector('#stage').scrollTo(0, 0)")
     return page
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo) -> Any:
+    """Keeps a screenshot of what a failed test looked at."""
+    report = yield
+    if report.when == "call" and report.failed:
+        ARTIFACTS.mkdir(exist_ok=True)
+        for page in (x for x in getattr(item, "funcargs", {}).values() if isinstance(x, Page)):
+            with suppress(Error):
+                page.screenshot(path=ARTIFACTS / f"failed-{item.name}.png", timeout=60_000)
+    return report
 
 
 @pytest.fixture

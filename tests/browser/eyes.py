@@ -19,8 +19,8 @@ def pixels(page: Page, algorithm: str) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
 
 
-def count(image: np.ndarray, colour: Rgb, tolerance: int = 24) -> int:
-    """How many pixels have a colour, or nearly so."""
+def count(image: np.ndarray, colour: Rgb, tolerance: int = 40) -> int:
+    """How many pixels have a colour, or nearly so: the water's surface pales what is seen through it."""
     return int((np.abs(image - np.array(colour)).max(axis=-1) <= tolerance).sum())
 
 
