@@ -117,6 +117,7 @@ def _algorithm(
         "notes": list(tracks.notes),
         "graph": first and "graphs" in tracks.graph,
         "schedule": first and "slots" in tracks.graph,
+        "sound": first and "moments" in tracks.graph,
     }
 
 

@@ -70,7 +70,7 @@ class Watch:
         new = {"algorithm": algorithm, "time_s": times[start:]}
         for what, digits in (("mean", 3), ("cov", 6)):
             new[what] = {
-                subject: [[round(x, digits) for x in row] for row in rows[start:]]
+                subject: [[x if x is None else round(x, digits) for x in row] for row in rows[start:]]
                 for subject, rows in partial[what].items()
             }
         self._journal.say(self._job.id, "estimates", new)

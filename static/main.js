@@ -12,6 +12,7 @@ import { mountSchedule } from "./pursuit/schedule.js";
 import { mountRooms } from "./rooms.js";
 import { mountRuns } from "./runs/runs.js";
 import { mountSide } from "./side.js";
+import { mountListening } from "./slam/listening.js";
 import { mountBroadcasts } from "./smoothing/broadcasts.js";
 import { clock } from "./state/clock.js";
 import { suspect } from "./state/connection.js";
@@ -58,6 +59,7 @@ const session = new SceneSession({
 mountToolbar(session, panes);
 keepPanesInLink((pose) => session.look(pose));
 mountTimeline();
+mountListening();
 mountSchedule();
 mountPlots();
 mountBroadcasts();

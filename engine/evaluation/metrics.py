@@ -63,7 +63,8 @@ def evaluate(
     largest distance over trials and times between the mean and the benchmark's. error_median_m is the median over
     trials of a trial's mean error, final_error_median_m that of the error at its last time with a reference. A series
     of one subject becomes a metric of the same name, its mean over trials and times, with NAME_interval, the 95 %
-    interval of that mean over trials, and NAME_median, the median over trials. Undefined or infinite figures are None.
+    interval of that mean over trials, and three medians over trials: NAME_median of a trial's mean, NAME_first and
+    NAME_final of the first and the last value known. Undefined or infinite figures are None.
     """
     benchmark = results[centralized].beliefs if centralized is not None and centralized in results else {}
     return {
@@ -125,6 +126,8 @@ def _subject(truth: np.ndarray | None, subject: str, tracks: Tracks, benchmark: 
             metrics[what] = number(known.mean()) if known.size else None
             metrics[f"{what}_interval"] = _interval(curve.value)
             metrics[f"{what}_median"] = _median(curve.value)
+            for which, order in (("first", 1), ("final", -1)):
+                metrics[f"{what}_{which}"] = _median(_one(curve.value[:, ::order]))
     return metrics
 
 
@@ -146,6 +149,11 @@ def _median(value: np.ndarray) -> float | None:
         return None
     means = np.where(known, value, 0.0)[having].sum(axis=1) / known[having].sum(axis=1)
     return number(np.median(means))
+
+
+def _one(value: np.ndarray) -> np.ndarray:
+    """The first known value of each trial of (trials, T): (trials, 1), NaN where there is none."""
+    return np.take_along_axis(value, np.isfinite(value).argmax(axis=1)[:, None], axis=1)
 
 
 def _error(truth: np.ndarray, belief: Belief) -> SubjectMetrics:

@@ -12,6 +12,7 @@ from engine.slam.mission import SlamMission
 from engine.slam.products import product
 from engine.slam.reckoning import reckon
 from engine.slam.run import Moment, Options, over_trials
+from engine.slam.story import told_array
 
 
 def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
@@ -30,7 +31,9 @@ def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
         beacons[a.beacon] = product(densities[a.beacon], N, rng)
         end = n == len(log.arrays)
         last, cautions = (poses, log.cautions) if end else (None, {})
-        yield Moment(a.poses[-1], dict(beacons), n / len(log.arrays), last, cautions=cautions)
+        told = {"array": told_array(a.array, elements.mean(0))} if trial == mission.trials[0] else {}
+        here, done = poses[a.poses[-1]][:, :2], n / len(log.arrays)
+        yield Moment(a.poses[-1], here, dict(beacons), done, last, cautions=cautions, told=told)
 
 
 run = over_trials(solve)

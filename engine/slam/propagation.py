@@ -63,11 +63,11 @@ class Points:
 
 @dataclass(frozen=True)
 class Up:
-    """An up-pass: the conditionals by clique, the log evidence (1 or N,), and how many cliques were reused."""
+    """An up-pass: the conditionals by clique, the log evidence (1 or N,), and which cliques were not done again."""
 
     conditionals: list[Conditional]
     log_evidence: np.ndarray
-    reused: int
+    reused: frozenset[int]
 
 
 class Propagation:
@@ -91,7 +91,7 @@ class Propagation:
         conditionals: list[Conditional] = [None] * len(tree.cliques)  # type: ignore[list-item]
         incoming: list[list[tuple[tuple[str, ...], Message]]] = [[] for _ in tree.cliques]
         kept: dict[tuple, tuple[Conditional, Message]] = {}
-        reused = 0
+        reused: set[int] = set()
         for i in reversed(range(len(tree.cliques))):
             clique = tree.cliques[i]
             frontals = [v for v in clique.frontals if v not in given]
@@ -107,8 +107,9 @@ class Propagation:
                 tuple((v, points.versions[v]) for v in touched),
             )
             found = self._kept.get(key)
-            reused += found is not None
-            if found is None:
+            if found is not None:
+                reused.add(i)
+            else:
                 found = self.eliminate(graph, frontals, separator, homes[i], incoming[i], points, given)
             kept[key] = found
             conditionals[i], message = found
@@ -118,7 +119,7 @@ class Propagation:
             else:
                 evidence = evidence + message.const
         self._kept = kept
-        return Up(conditionals, evidence, reused)
+        return Up(conditionals, evidence, frozenset(reused))
 
     def eliminate(
         self,

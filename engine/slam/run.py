@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.stats import chi2
+from scipy.stats import binom, chi2
 
 from engine.registry import Progress
 from engine.slam.building import Plan, growths, name
 from engine.slam.densities import fit, from_gaussian
+from engine.slam.factors.synthetic_aperture import SyntheticAperture
 from engine.slam.log import SlamLog, thinned
 from engine.slam.mission import SlamMission
-from engine.slam.solver import Solver
+from engine.slam.solver import Misfit, Solver
+from engine.slam.story import told_array, told_beliefs, told_factors, told_tree
 from engine.tracks import Belief, Samples, Series, Tracks
 
 #: Chance below which a graph's residuals are said not to fit its model.
@@ -36,18 +38,20 @@ class Options(BaseModel):
 
 @dataclass(frozen=True)
 class Moment:
-    """Beliefs of the beacons, each (N, 2), once a pose was reached; `last` holds all poses (P, N, 2) in the end.
+    """What is believed once a pose was reached: of that pose, `here`, and of the beacons heard, each (N, 2).
 
-    Then there are also the sum of squared residuals with its degrees of freedom, where the solver knows them, and
-    what speaks against each array, by its first pose.
+    In the end there are all poses in `last` (P, N, 2), what speaks against the model, where the solver knows it, and
+    against each array, by its first pose. `told` is what of the story only the solver knows.
     """
 
     pose: int
+    here: np.ndarray
     beacons: dict[str, np.ndarray]
     done: float
     last: np.ndarray | None = None
-    misfit: tuple[float, int] | None = None
+    misfit: Misfit | None = None
     cautions: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    told: dict[str, Any] = field(default_factory=dict)
 
 
 #: From a trial's log, its mission and its number to the moments of its solution.
@@ -65,18 +69,24 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
         total = max(len(log.arrays) if plan.measurements == "arrays" else len(log.pings) + len(log.readings), 1)
         done = 0
         for growth in growths(log, plan, mission.time_s, mission.scenario.outlier_share):
-            solver.extend(growth.kinds, growth.factors)
+            step = solver.extend(growth.kinds, growth.factors)
             done += growth.measurements
-            last = done >= total
-            beacons = solver.beliefs(solver.beacons)
-            if not last:
-                yield Moment(growth.pose, beacons, done / total)
-                continue
             beliefs = solver.beliefs()
+            here, places = beliefs[name(growth.pose)][:, :2], {b: beliefs[b] for b in solver.beacons}
+            told: dict[str, Any] = {}
+            if trial == mission.trials[0]:
+                told["tree"] = told_tree(step.tree, step.reused)
+                told["factors"] = told_factors(growth.factors, {name(k): k for k in range(growth.pose + 1)})
+            for factor in growth.factors if told else ():
+                if isinstance(factor, SyntheticAperture):
+                    at = np.stack([beliefs[v][:, :2].mean(0) for v in factor.variables[:-1]])
+                    told["array"] = told_array(factor.array, at)
+            if done < total:
+                yield Moment(growth.pose, here, places, done / total, told=told)
+                continue
             poses = np.stack([beliefs[name(k)][:, :2] for k in range(log.poses)])
-            places = {b: beliefs[b] for b in solver.beacons}
             cautions = log.cautions if plan.measurements == "arrays" else {}
-            yield Moment(growth.pose, places, 1.0, poses, solver.misfit(), cautions)
+            yield Moment(growth.pose, here, places, 1.0, poses, solver.misfit(), cautions, told)
 
     return over_trials(solve)
 
@@ -90,12 +100,21 @@ def _doubts(ends: list[Moment]) -> list[str]:
         pose, said = doubtful[0]
         notes.append(f"{len(doubtful)} of {len(arrays)} arrays, such as the one from pose {pose}: {'; '.join(said)}")
     known = [end.misfit for end in ends if end.misfit is not None]
-    unlikely = [m for m in known if m[1] > 0 and chi2.sf(*m) < UNLIKELY]
+    unlikely = [m for m in known if m.freedom > 0 and chi2.sf(m.squares, m.freedom) < UNLIKELY]
     if unlikely:
-        squares, freedom = max(unlikely, key=lambda m: m[0] / m[1])
+        worst = max(unlikely, key=lambda m: m.squares / m.freedom)
         notes.append(
             f"residuals do not fit the model in {len(unlikely)} of {len(known)} trials: their squares sum to "
-            f"{squares:.0f} where about {freedom} was expected; is a clock, the sound speed or a noise wrong?"
+            f"{worst.squares:.0f} where about {worst.freedom} was expected; is a clock, the sound speed or a noise "
+            "wrong?"
+        )
+    refusing = [m for m in known if binom.sf(m.refused - 1, m.ranges, m.doubt) < UNLIKELY]
+    if refusing:
+        worst = max(refusing, key=lambda m: m.refused / m.ranges)
+        notes.append(
+            f"ranges do not fit each other in {len(refusing)} of {len(known)} trials: {worst.refused} of "
+            f"{worst.ranges} were refused where about {worst.ranges * worst.doubt:.0f} was expected; is a clock, the "
+            "sound speed or the direct path wrong?"
         )
     return notes
 
@@ -117,20 +136,14 @@ def over_trials(solve: Solve) -> Callable[[SlamMission, Progress], Tracks]:
     return run
 
 
-def _partial(mission: SlamMission, moment: Moment) -> dict[str, Any] | None:
-    """The first trial's new beliefs for someone watching: of the beacons as they come, of the vehicle in the end."""
-    at = [float(mission.time_s[moment.pose])]
-    if moment.last is None:
-        return {
-            "time_s": at,
-            "mean": {b: [x.mean(0).tolist()] for b, x in moment.beacons.items()},
-            "cov": {b: [_packed(np.cov(x.T))] for b, x in moment.beacons.items()},
-        }
-    mean, cov = _moments(moment.last)
+def _partial(mission: SlamMission, moment: Moment) -> dict[str, Any]:
+    """The first trial's new beliefs for someone watching; None in the rows of a beacon that was not heard yet."""
+    found = {mission.vehicle: moment.here} | moment.beacons
+    subjects = [mission.vehicle, *mission.beacons]
     return {
-        "time_s": mission.time_s.tolist(),
-        "mean": {mission.vehicle: mean.tolist()},
-        "cov": {mission.vehicle: [_packed(c) for c in cov]},
+        "time_s": [float(mission.time_s[moment.pose])],
+        "mean": {s: [found[s].mean(0).tolist() if s in found else [None] * 2] for s in subjects},
+        "cov": {s: [_packed(np.cov(found[s].T)) if s in found else [None] * 3] for s in subjects},
     }
 
 
@@ -163,13 +176,26 @@ def _tracks(mission: SlamMission, histories: list[list[Moment]]) -> Tracks:
         mean, cov = _moments(points)
         beliefs[beacon] = Belief(mean[:, held], cov[:, held])
         series |= _curves(mission, beacon, points, held)
+    series |= _misfit(mission.vehicle, [h[-1] for h in histories], T)
     notes = _doubts([h[-1] for h in histories])
-    return Tracks(beliefs, samples=samples, series=series, notes=(*mission.notes, *notes))
+    story = {"moments": [_story(mission, moment) for moment in histories[0]]}
+    return Tracks(beliefs, samples=samples, series=series, notes=(*mission.notes, *notes), graph=story)
+
+
+def _story(mission: SlamMission, moment: Moment) -> dict[str, Any]:
+    when = {
+        "time_s": float(mission.time_s[moment.pose]),
+        "pose": moment.pose,
+        "tree": None,
+        "array": None,
+        "factors": [],
+    }
+    return when | told_beliefs(moment.beacons, moment.pose) | moment.told
 
 
 def _curves(mission: SlamMission, beacon: str, points: np.ndarray, held: np.ndarray) -> dict[str, Series]:
     """Errors of the mean and of the mode (C19 eq. 5.2), and the divergence from a Gaussian (eq. 5.3)."""
-    trials, K, T = points.shape[0], points.shape[1], len(held)
+    trials, K = points.shape[:2]
     modes, apart = np.empty((trials, K, 2)), np.empty((trials, K))
     for t in range(trials):
         for k in range(K):
@@ -181,8 +207,16 @@ def _curves(mission: SlamMission, beacon: str, points: np.ndarray, held: np.ndar
     if truth is None:
         return curves
     off = np.linalg.norm(modes[:, held] - truth, axis=-1)
-    final = np.full((trials, T), np.nan)
-    final[:, -1] = off[:, -1]
     curves[f"mode_error_m/{beacon}"] = Series("Error of the densest place", "m", off, (beacon,))
-    curves[f"final_mode_error_m/{beacon}"] = Series("Error of the densest place at the end", "m", final, (beacon,))
     return curves
+
+
+def _misfit(vehicle: str, ends: list[Moment], T: int) -> dict[str, Series]:
+    """Squared residuals over their expected sum, at the end: about 1 where the model holds."""
+    value = np.full((len(ends), T), np.nan)
+    for row, end in zip(value, ends):
+        if end.misfit is not None and end.misfit.freedom > 0:
+            row[-1] = end.misfit.squares / end.misfit.freedom
+    if not np.isfinite(value).any():
+        return {}
+    return {f"misfit/{vehicle}": Series("Squared residuals over those expected", "1", value, (vehicle,))}

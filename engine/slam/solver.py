@@ -21,6 +21,7 @@ import numpy as np
 from engine.slam.bayes_tree import BayesTree, tree
 from engine.slam.elimination import order
 from engine.slam.factors.factor import Factor
+from engine.slam.factors.heard import Heard
 from engine.slam.factors.remembered import remembered
 from engine.slam.graph import Graph
 from engine.slam.propagation import Points, Propagation, Up, down
@@ -43,11 +44,26 @@ SETTLED = 1e-3
 
 
 @dataclass(frozen=True)
-class Step:
-    """What one extension did: cliques of the tree, how many were reused, effective kernels, share of moves taken."""
+class Misfit:
+    """What speaks against a model.
 
-    cliques: int
-    reused: int
+    squares is the sum of squared residuals that should about equal freedom, the degrees of freedom; refused of ranges
+    were taken to be wrong altogether, which each is with the chance doubt.
+    """
+
+    squares: float
+    freedom: int
+    refused: int
+    ranges: int
+    doubt: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one extension did: its tree and which cliques were not done again, effective kernels, moves taken."""
+
+    tree: BayesTree
+    reused: frozenset[int]
     effective: float
     accepted: float
 
@@ -94,7 +110,7 @@ class Solver:
         weights = self._evidence - before - log_q
         weights = np.exp(weights - weights.max())
         effective = float(weights.sum() ** 2 / np.square(weights).sum())
-        reused = self._up.reused if self._up else 0
+        grown, reused = self.tree, self._up.reused if self._up else frozenset()
         accepted = 0.0
         self.kernels = wanted
         if self._given:
@@ -102,7 +118,7 @@ class Solver:
             accepted = float(np.mean([self._sweep(n % REDRAWS == 0) for n in range(self.sweeps)]))
         if self.lag is not None:
             self._forget(self.lag)
-        return Step(len(self.tree.cliques), reused, effective, accepted)
+        return Step(grown, reused, effective, accepted)
 
     def beliefs(self, variables: Iterable[str] | None = None) -> dict[str, np.ndarray]:
         """Joint draws (N, d) of these variables, one for each kernel; of all without an argument.
@@ -114,19 +130,29 @@ class Solver:
         found = self._past | drawn | {v: self._points.values[v] for v in self._given}
         return {v: found[v] for v in (variables if variables is not None else found)}
 
-    def misfit(self) -> tuple[float, int]:
-        """Sum of squared residuals at the mode given the median kernel, and the degrees of freedom it should equal."""
+    def misfit(self) -> Misfit:
+        """How badly the measurements fit the mode that each kernel leads to, by the median over kernels."""
         up = self._pass()
         mean = down(self.graph, self.tree, up, self._points, self._given, self.kernels, None)
         at = mean | {v: self._points.values[v] for v in self._given}
-        squares, rows = np.zeros(self.kernels), np.zeros(self.kernels)
+        squares, rows, refused = np.zeros(self.kernels), np.zeros(self.kernels), np.zeros(self.kernels)
+        doubts = []
         for f in self.graph.factors:
             e, J = f.linearize(*(at[v] for v in f.variables))
             felt = np.any(np.stack(np.broadcast_arrays(*(np.abs(Jv).max(-1) > 0 for Jv in J))), axis=0)
             squares += np.where(felt, np.square(e), 0.0).sum(-1)
             rows += np.broadcast_to(felt, e.shape).sum(-1)
+            if isinstance(f, Heard):
+                refused += f.refused(*(at[v] for v in f.variables))
+                doubts.append(f.doubt)
         free = sum(k.dim for k in self.graph.kinds.values() if k is not LABEL)
-        return float(np.median(squares)), round(float(np.median(rows))) - free
+        return Misfit(
+            squares=float(np.median(squares)),
+            freedom=round(float(np.median(rows))) - free,
+            refused=round(float(np.median(refused))),
+            ranges=len(doubts),
+            doubt=float(np.mean(doubts)) if doubts else 0.0,
+        )
 
     def _last(self, kinds: dict[str, Kind]) -> list[str]:
         """What stays near the root: the newest pose, then the beacons."""

@@ -14,8 +14,8 @@ from server.view import thinned
 TRIALS, MOMENTS = 300, 400
 #: Share of the trials inside the envelope, and inside each line of equal density.
 WITHIN, DENSITIES = 0.9, (0.9, 0.5)
-#: Cells of the grid on which densities are computed, and how far it reaches beyond the points (kernel widths).
-CELLS, MARGIN = 44, 3.0
+#: Cells, least and most, of the grid on which densities are computed, and its reach beyond the points (kernel widths).
+CELLS, MOST_CELLS, MARGIN = 44, 160, 3.0
 
 
 @dataclass(frozen=True)
@@ -85,27 +85,37 @@ def envelope(points: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     return mean, np.array([cov[0, 0], cov[0, 1], cov[1, 1]])
 
 
-def contours(points: np.ndarray) -> list[np.ndarray]:
-    """Lines of equal density, each (M, 2, 2) m, that hold DENSITIES of a kernel density estimate of points (N, 2).
+def contours(
+    points: np.ndarray, shares: tuple[float, ...] = DENSITIES, width: np.ndarray | None = None
+) -> list[np.ndarray]:
+    """Lines of equal density, each (M, 2, 2) m, that hold such shares of a kernel density estimate of points (N, 2).
 
-    A Gaussian kernel of Scott's width on a grid; the level of a share p is the density that p of the points exceed
-    (Hyndman 1996).
+    A Gaussian kernel of the width (2,) given, else Scott's, on a grid; the level of a share p is the density that p of
+    the points exceed (Hyndman 1996).
     """
     if len(points) < 5:
         return []
-    spread = np.maximum(points.std(axis=0, ddof=1), 1e-6 * max(float(np.ptp(points)), 1e-6))
-    width = spread * len(points) ** (-1 / 6)
+    kernel = scotts(points) if width is None else width
+    # A cell no wider than a kernel shows every mode; a ring of thin kernels takes more cells than a blot.
+    extent = np.ptp(points, axis=0) + 2 * MARGIN * kernel
+    cells = np.clip((1.5 * extent / kernel).astype(int), CELLS, MOST_CELLS)
     axes = [
-        np.linspace(points[:, i].min() - MARGIN * width[i], points[:, i].max() + MARGIN * width[i], CELLS)
+        np.linspace(points[:, i].min() - MARGIN * kernel[i], points[:, i].max() + MARGIN * kernel[i], cells[i])
         for i in range(2)
     ]
 
     def kernels(at: np.ndarray, i: int) -> np.ndarray:
-        return np.exp(-0.5 * ((at[:, None] - points[None, :, i]) / width[i]) ** 2)
+        return np.exp(-0.5 * ((at[:, None] - points[None, :, i]) / kernel[i]) ** 2)
 
     density = kernels(axes[0], 0) @ kernels(axes[1], 1).T
-    own = np.einsum("nm,nm->n", kernels(points[:, 0], 0), kernels(points[:, 1], 1))
-    return [level_line(axes[0], axes[1], density, float(np.quantile(own, 1 - share))) for share in DENSITIES]
+    own = np.mean(kernels(points[:, 0], 0) * kernels(points[:, 1], 1), axis=1) * len(points)
+    return [level_line(axes[0], axes[1], density, float(np.quantile(own, 1 - share))) for share in shares]
+
+
+def scotts(points: np.ndarray) -> np.ndarray:
+    """Scott's widths (2,) m of a kernel density estimate of points (N, 2) m."""
+    spread = np.maximum(points.std(axis=0, ddof=1), 1e-6 * max(float(np.ptp(points)), 1e-6))
+    return spread * len(points) ** (-1 / 6)
 
 
 def level_line(x: np.ndarray, y: np.ndarray, z: np.ndarray, level: float) -> np.ndarray:

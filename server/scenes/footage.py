@@ -9,6 +9,7 @@ import numpy as np
 
 from server.scenes.graph import Graph
 from server.scenes.pursuit import Pursuit
+from server.scenes.sound import Sound
 
 
 @dataclass
@@ -41,7 +42,7 @@ class Packet:
 @dataclass(frozen=True)
 class Footage:
     """A job's mission: report times, subjects, truth {S: (T, 2)} m of trial 0, packets by time of launch; and, of the
-    algorithms that keep them, factor graphs {algorithm: {subject: graph}} and pursuits {algorithm: pursuit}."""
+    algorithms that keep them, factor graphs {algorithm: {subject: graph}}, pursuits and sounds {algorithm: ...}."""
 
     time_s: np.ndarray
     subjects: list[dict[str, Any]]
@@ -50,6 +51,7 @@ class Footage:
     tracks: dict[str, Track]
     graphs: dict[str, dict[str, Graph]] = field(default_factory=dict)
     pursuits: dict[str, Pursuit] = field(default_factory=dict)
+    sounds: dict[str, Sound] = field(default_factory=dict)
 
     @property
     def names(self) -> list[str]:

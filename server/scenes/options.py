@@ -17,7 +17,7 @@ class Options(BaseModel):
     keep in the middle, whose factor graph to draw, and whose view of a pursuit; hidden: vehicles to leave out; colours:
     of each algorithm laid over each other; depth: how much depths are stretched, 0 for as much as suits; linked:
     whether cameras move together; cloud, contours: all trials at the moment, as points with their 90 % envelope, and as
-    lines of equal density.
+    lines of equal density; sound: beliefs of beacons and the beams that made them.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
@@ -36,6 +36,7 @@ class Options(BaseModel):
     hidden: Annotated[list[Name], Field(max_length=500)] = []
     graph: Name | None = None
     pursuit: Name | None = None
+    sound: bool = True
     colours: Annotated[dict[Name, Annotated[list[Level], Field(min_length=3, max_length=3)]], Field(max_length=64)] = {}
 
     def chosen(self, values: dict[str, Any]) -> Options:

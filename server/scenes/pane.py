@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import rich
 
-from server.scenes import ensemble, graph, inner, palette, pursuit
+from server.scenes import ensemble, graph, inner, palette, pursuit, sound
 from server.scenes.ensemble import Ensemble
 from server.scenes.footage import Footage, at
 from server.scenes.geometry import SPAN, Chart, compass, dashes, ellipses, radius, round_length, scale_bar, segments
@@ -42,7 +42,7 @@ class Pane:
         self.ensembles: Mapping[str, Ensemble] = {}
         self._chart: Chart
         self._look = palette.LIGHT
-        self._graphed = self._clouded = self._pursued = False
+        self._graphed = self._clouded = self._pursued = self._sounded = False
         self._truth: Places = {}
         self._without: Sequence[str] | None = None
         self._staged = 0
@@ -166,6 +166,7 @@ class Pane:
             self._rays(moment_s, first, truth, options)
             self._graph(algorithms, moment_s, options.graph)
             self._pursuit(algorithms, moment_s, options.pursuit, first, truth)
+            self._sound(algorithms, moment_s, options.sound)
             self._place(first | truth if overlay else first, {} if overlay else truth)
 
     def _colour(self, algorithm: str, n: int, options: Options) -> palette.Rgb:
@@ -302,6 +303,21 @@ class Pane:
         self._lines("/pursuit/lines", drawn.lines, drawn.colours, 2.2)
         self._lines("/pursuit/thin", drawn.thin, drawn.thin_colours, 1.2)
 
+    def _sound(self, algorithms: Sequence[str], moment_s: float, wanted: bool) -> None:
+        """Beliefs of beacons and beams of arrays; nothing where there are none or they are off."""
+        found = self.footage.sounds.get(algorithms[0]) if len(algorithms) == 1 and wanted else None
+        if found is None and not self._sounded:
+            return
+        self._sounded = found is not None
+        drawn = sound.Drawing([], [], [], [])
+        if found is not None:
+            names = self.footage.names
+            extent = float(np.ptp(self.footage.points(), axis=0).max())
+            depths = {name: self._depth(name) for name in names}
+            drawn = sound.drawing(found, moment_s, self._chart, self._look, names, depths, extent)
+        self._lines("/sound/density", drawn.levels, drawn.level_colours, 1.8)
+        self._lines("/sound/beams", drawn.beams, drawn.beam_colours, 1.4)
+
     def _place(self, now: Places, truth: Places) -> None:
         for n, name in enumerate(self.footage.names):
             for node, places in ((f"/vehicle/{n}", now), (f"/true/{n}", truth)):
@@ -318,7 +334,8 @@ class Pane:
         return next((s["depth_m"] for s in self.footage.subjects if s["name"] == subject), 0.0) or 0.0
 
     def _moves(self, subject: str) -> bool:
-        return all(s["kind"] != "fixed" for s in self.footage.subjects if s["name"] == subject)
+        """Whether a track is drawn of it: what is taken to stand still has none, however its estimate wanders."""
+        return all(s["kind"] not in ("fixed", "beacon") for s in self.footage.subjects if s["name"] == subject)
 
     def _points(self, name: str, points: list[np.ndarray], colours: list[np.ndarray], size: float) -> None:
         """One cloud of points (N, 3) each in its colour (N, 3), under a name that is used again."""

@@ -16,7 +16,7 @@ import numpy as np
 from server import artifacts
 from server.jobs import Jobs
 from server.problems import Refusal
-from server.scenes import ensemble, graph, palette, pursuit
+from server.scenes import ensemble, graph, palette, pursuit, sound
 from server.scenes.cameras import ABOVE, OBLIQUE, Cameras
 from server.scenes.footage import Footage, at, footage
 from server.scenes.geometry import Chart, chart
@@ -205,7 +205,8 @@ class Session:
                 graphs = await asyncio.to_thread(_graphs, jobs, job, view)
                 pursuits = await asyncio.to_thread(_pursuits, jobs, job, view)
                 self._job = job
-                await self._stage(replace(footage(view, names), graphs=graphs, pursuits=pursuits))
+                sounds = await asyncio.to_thread(_sounds, jobs, job, view)
+                await self._stage(replace(footage(view, names), graphs=graphs, pursuits=pursuits, sounds=sounds))
         except Refusal as refusal:
             await self._send({"type": "error", "detail": refusal.detail})
         except asyncio.CancelledError:
@@ -318,6 +319,16 @@ def _pursuits(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, pursuit.P
             read = pursuit.read(json.loads(path.read_text(encoding="utf-8")), names)
             if read is not None:
                 found[algorithm] = read
+    return found
+
+
+def _sounds(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, sound.Sound]:
+    """How beliefs grew, of the algorithms of a finished job that tell it."""
+    found = {}
+    for algorithm, told in view["algorithms"].items():
+        if told.get("sound"):
+            path = jobs.artifact(job, artifacts.graph_file(algorithm))
+            found[algorithm] = sound.read(json.loads(path.read_text(encoding="utf-8")))
     return found
 
 

@@ -25,6 +25,7 @@ export const paneState = createStore({
   contours: false,
   graph: false,
   pursuit: true,
+  sound: true,
   follow: false,
   top: false,
   linked: true,

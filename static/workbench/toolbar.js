@@ -4,6 +4,7 @@ import { el, part } from "../look/dom.js";
 import { darkScheme, lineStyle, vehicleColour } from "../look/palette.js";
 import { dot } from "../look/swatch.js";
 import { schedulers } from "../pursuit/story.js";
+import { listeners } from "../slam/story.js";
 import { tellers } from "../smoothing/story.js";
 import { LAYOUTS, hasWebGL, paneState } from "../state/panes.js";
 import { store } from "../state/store.js";
@@ -15,6 +16,7 @@ const TOGGLES = {
   rays: { label: "Rays", hint: "Packets: the sender's colour when heard, grey when lost" },
   graph: { label: "Graph", hint: "Factor graph of the chosen vehicle, smoothed: received poses solid, lost ones hollow, priors square, composed links as arcs" },
   pursuit: { label: "Formation", hint: "Waypoints, the formation kept and the one wanted (dashed), messages under way, and what the chosen vehicle knows: hyperbolas of equal time difference with two sigmas on either side" },
+  sound: { label: "Beliefs", hint: "Where beacons may be: lines that hold 20, 40, 60 and 80 % of the belief, and the beams of the arrays so far" },
   follow: { label: "Follow", hint: "Keep the chosen vehicle in the middle" },
   top: { label: "From above", hint: "Look straight down, north up", solid: true },
 };
@@ -61,13 +63,13 @@ export function mountToolbar(session, panes) {
   );
 
   const tell = () => {
-    const { trails, ellipses, rays, sigma, cloud, contours, top, linked, depth, follow, graph, pursuit } = paneState.state;
+    const { trails, ellipses, rays, sigma, cloud, contours, top, linked, depth, follow, graph, pursuit, sound } = paneState.state;
     const { vehicle, hidden, job, algorithms } = store.state;
     const named = (on) => (on ? vehicle : null);
     const laid = (job?.algorithms ?? []).filter((name) => !hidden.algorithms.has(name));
     const colours = Object.fromEntries(laid.map((name) => [name, rgb(lineStyle(name, algorithms ?? []).colour)]));
     const dark = darkScheme.matches;
-    session.options({ trails, ellipses, rays, sigma, cloud, contours, top, linked, depth, dark, colours, hidden: [...hidden.vehicles], follow: named(follow), graph: named(graph), pursuit: named(pursuit) });
+    session.options({ trails, ellipses, rays, sigma, cloud, contours, top, linked, depth, sound, dark, colours, hidden: [...hidden.vehicles], follow: named(follow), graph: named(graph), pursuit: named(pursuit) });
   };
 
   let drawn = "";
@@ -81,7 +83,7 @@ export function mountToolbar(session, panes) {
     }
     for (const input of vehicles.querySelectorAll("input")) input.checked = input.value === vehicle;
   });
-  paneState.watch(["trails", "ellipses", "rays", "graph", "pursuit", "follow", "top", "sigma", "cloud", "contours", "linked", "depth", "layout"], (now) => {
+  paneState.watch(["trails", "ellipses", "rays", "graph", "pursuit", "sound", "follow", "top", "sigma", "cloud", "contours", "linked", "depth", "layout"], (now) => {
     for (const [name, box] of Object.entries(boxes)) box.checked = now[name];
     layout.value = now.layout;
     sigma.value = String(now.sigma);
@@ -96,6 +98,7 @@ export function mountToolbar(session, panes) {
   store.watch(["view"], ({ view }) => {
     boxes.graph.parentElement.hidden = !tellers(view).length;
     boxes.pursuit.parentElement.hidden = !schedulers(view).length;
+    boxes.sound.parentElement.hidden = !listeners(view).length;
   });
   store.watch(["job"], ({ job }) => {
     const many = (job?.trials ?? 1) > 4 && job?.state === "done";

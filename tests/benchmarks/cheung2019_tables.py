@@ -104,7 +104,7 @@ def errors(group: Group, trials: int) -> dict[str, np.ndarray]:
     tracks, truth = result.tracks[group.algorithm], result.truth
     vehicle, beacon = scenario.vehicle.name, scenario.beacon.name  # type: ignore[attr-defined]
     off = {s: np.linalg.norm(tracks.beliefs[s].mean - truth[s], axis=-1) for s in (vehicle, beacon)}
-    mode = tracks.series[f"final_mode_error_m/{beacon}"].value[:, -1]
+    mode = tracks.series[f"mode_error_m/{beacon}"].value[:, -1]
     poses = off[vehicle].max(axis=1) if group.table == "5.3" else off[vehicle].mean(axis=1)
     return {"mean": off[beacon][:, -1], "mode": mode, "poses": poses}
 

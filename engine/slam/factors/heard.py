@@ -20,13 +20,14 @@ class Heard(Factor):
 
     At a point of linearization the peak that explains it best holds, or none does and the range says nothing
     (max-mixture, Olson and Agarwal 2013). slack_m widens the peaks for that choice alone, by what the distance may
-    still be off when it is made.
+    still be off when it is made. doubt is the chance that the range is wrong altogether.
     """
 
     range_m: np.ndarray
     sigma_m: np.ndarray
     log_odds: np.ndarray
     slack_m: float
+    doubt: float
 
     def residual(self, *values: np.ndarray) -> np.ndarray:
         e, _, _ = self._explained(*values)
@@ -49,6 +50,11 @@ class Heard(Factor):
         r = np.abs(self.range_m[k] + self.sigma_m[k] * rng.standard_normal(strata.shape))
         angle = 2 * np.pi * strata
         return values[1 - towards][..., :2] + r[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+    def refused(self, *values: np.ndarray) -> np.ndarray:
+        """Whether (...,) no peak explains the distance."""
+        _, _, slope = self._explained(*values)
+        return slope == 0.0
 
     def _explained(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residual (..., 2): whitened distance and penalty of the choice; direction (..., 2), slope of the first."""
@@ -96,7 +102,7 @@ def _of_peaks(
     doubt = min(max(doubt, 1e-6), 1.0 - 1e-6)
     # A right range has the density mass / (sqrt(2 pi) sigma) at its peak, a wrong one 1 / ASTRAY_M.
     odds = (1 - doubt) * mass / (np.sqrt(2 * np.pi) * sigma) / (doubt / ASTRAY_M)
-    return Heard((a, b), centre, sigma, np.log(odds), slack_m)
+    return Heard((a, b), centre, sigma, np.log(odds), slack_m, doubt)
 
 
 def peaks(ranges_m: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -72,6 +72,7 @@ def test_medians_are_over_trials_of_what_each_is_off_on_average_and_in_the_end()
     assert found["error_median_m"] == pytest.approx(4.0)
     assert found["final_error_median_m"] == pytest.approx(6.0)
     assert found["lag_m_median"] == pytest.approx(4.0)
+    assert (found["lag_m_first"], found["lag_m_final"]) == (3.0, 6.0)
 
 
 @pytest.mark.parametrize("truth", [None, np.full((1, 3, 2), np.nan)])

@@ -1,0 +1,75 @@
+"""What SLAM tells of its first trial, for people to look into: beliefs, beams, records and the tree as they grew.
+
+All in JSON's own types and of bounded size: `moments` in order of time, each {time_s, beacons {name: {points_m,
+bandwidth_m}}, divergence {name: nats}, pose, factors [[first pose, last pose, beacon, or null of a fix]] that were
+added, tree {parents, sizes, reused} or null, array {places_m, look_rad, beam, ranges_m, records} or null}.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from engine.acoustics.beamformer import azimuths
+from engine.acoustics.synthetic_array import SyntheticArray
+from engine.slam.bayes_tree import BayesTree
+from engine.slam.densities import fit, from_gaussian
+from engine.slam.factors.factor import Factor
+
+#: Kernels told of a belief, looks of a beam, columns of a record, cliques of a tree that is told.
+POINTS, LOOKS, COLUMNS, CLIQUES = 150, 120, 160, 1500
+
+
+def told_beliefs(beacons: dict[str, np.ndarray], seed: int) -> dict[str, Any]:
+    """Kernels (N, 2) of each beacon, their bandwidths, and how far the belief is from a Gaussian (C19 eq. 5.3)."""
+    told, apart = {}, {}
+    for name, points in beacons.items():
+        kde = fit(points)
+        kept = points[np.linspace(0, len(points) - 1, min(len(points), POINTS)).round().astype(int)]
+        told[name] = {"points_m": _rounded(kept, 2), "bandwidth_m": _rounded(kde.bandwidth, 4)}
+        apart[name] = round(from_gaussian(kde, np.random.default_rng(seed)), 3)
+    return {"beacons": told, "divergence": apart}
+
+
+def told_factors(factors: Iterable[Factor], pose_of: Mapping[str, int]) -> list[list[Any]]:
+    """The poses [first, last] that each fix and each measurement is about, and the beacon it ties them to, if any."""
+    told = []
+    for factor in factors:
+        poses = [pose_of[v] for v in factor.variables if v in pose_of]
+        beacon = next((v for v in factor.variables if v not in pose_of), None)
+        if beacon is not None or len(factor.variables) == 1:
+            told.append([min(poses), max(poses), beacon])
+    return told
+
+
+def told_tree(tree: BayesTree, reused: frozenset[int]) -> dict[str, Any] | None:
+    """Parents (-1 for a root) and sizes of the cliques, and which were not done again; None for a very large tree."""
+    if len(tree.cliques) > CLIQUES:
+        return None
+    return {
+        "parents": [-1 if c.parent is None else c.parent for c in tree.cliques],
+        "sizes": [len(c.variables) for c in tree.cliques],
+        "reused": [int(i in reused) for i in range(len(tree.cliques))],
+    }
+
+
+def told_array(array: SyntheticArray, places_m: np.ndarray) -> dict[str, Any]:
+    """Beam of an array whose elements are at (m, 2), and its records' filter output, the loudest of each 1."""
+    look = azimuths(LOOKS)
+    beam = array.power(places_m[None], look)[0]
+    loud = np.abs(array.envelope)
+    edges = np.linspace(0, loud.shape[1], COLUMNS + 1).astype(int)[:-1]
+    columns = np.maximum.reduceat(loud, edges, axis=1)
+    return {
+        "places_m": _rounded(places_m, 2),
+        "look_rad": _rounded(look, 4),
+        "beam": _rounded(beam / beam.max(), 3),
+        "ranges_m": [round(float(array.ranges_m[0]), 2), round(float(array.ranges_m[-1]), 2)],
+        "records": _rounded(columns / columns.max(axis=1, keepdims=True), 2),
+    }
+
+
+def _rounded(x: np.ndarray, digits: int) -> list[Any]:
+    return np.round(np.asarray(x, dtype=float), digits).tolist()

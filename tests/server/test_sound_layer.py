@@ -1,0 +1,91 @@
+"""What a pane draws of localization by sound, against the estimator's own beliefs and the array's geometry."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from engine.registry import algorithm, silent
+from engine.slam.mission import fly
+from server.scenes import palette, sound
+from server.scenes.geometry import chart
+from tests.engine.slam.missions import scenario
+
+NAMES = ["auv", "beacon"]
+CHART = chart(np.array([[-100.0, -100.0], [100.0, 100.0]]), 0.0)
+
+
+@pytest.fixture(scope="module")
+def told():
+    """A run of straight arrays that pass a beacon, with what it tells as it is after a file."""
+    path = {"kind": "waypoints", "points_m": [[-30.0, -40.0], [30.0, -40.0]], "speed_mps": 1.0}
+    tables = {"vehicle": {"path": path}, "ranging": {"count": 0}, "arrays": {"count": 2}}
+    mission = fly(scenario(duration_s=45.0, odometry={"drift_mps": 0.02}, **tables), [0])
+    tracks = algorithm("sas_static").run(mission, silent)
+    return mission, tracks, json.loads(json.dumps(tracks.graph))
+
+
+def drawing(told, moment_s: float) -> sound.Drawing:
+    return sound.drawing(sound.read(told[2]), moment_s, CHART, palette.LIGHT, NAMES, {"beacon": 0.0}, 200.0)
+
+
+def unplaced(points: np.ndarray) -> np.ndarray:
+    """Back from the scene to metres."""
+    return points[..., :2] / CHART.scale + CHART.centre
+
+
+def test_nothing_is_drawn_before_the_first_measurement(told):
+    first = told[2]["moments"][0]["time_s"]
+    drawn = drawing(told, first - 1.0)
+    assert drawn == sound.Drawing([], [], [], [])
+
+
+def test_one_straight_array_draws_both_mirror_images_and_the_beam_points_at_them(told):
+    moment = told[2]["moments"][0]
+    drawn = drawing(told, moment["time_s"])
+    assert len(drawn.levels) == len(sound.SHARES)
+    widest = unplaced(np.concatenate(drawn.levels[0]))
+    beacon = np.array([3.0, -2.0])
+    for image in (beacon, np.array([3.0, -78.0])):
+        assert np.linalg.norm(widest - image, axis=1).min() < 6.0
+    rim = unplaced(drawn.beams[0][:, 0])
+    centre = np.mean(moment["array"]["places_m"], axis=0)
+    reach = np.linalg.norm(rim - centre, axis=1)
+    strongest = (rim - centre)[reach.argmax()] / reach.max()
+    towards = (beacon - centre) / np.linalg.norm(beacon - centre)
+    assert np.abs(strongest @ [1, 0]) == pytest.approx(abs(towards[0]), abs=0.1)
+    assert reach.max() == pytest.approx(sound.BEAM * 200.0, rel=1e-3)
+
+
+def test_lines_hold_their_share_of_the_belief(told):
+    """The innermost line is about the densest places: all of it is inside the outermost one's extent."""
+    moment = told[2]["moments"][-1]
+    drawn = drawing(told, moment["time_s"])
+    outer, inner = (unplaced(np.concatenate(drawn.levels[i])) for i in (0, -1))
+    assert (inner.min(0) >= outer.min(0) - 1e-9).all() and (inner.max(0) <= outer.max(0) + 1e-9).all()
+
+
+def test_arrays_before_stay_faint(told):
+    drawn = drawing(told, told[2]["moments"][-1]["time_s"])
+    assert len(drawn.beams) == 4
+    assert drawn.beam_colours[2] == palette.LIGHT.truth != drawn.beam_colours[0]
+
+
+def test_the_story_names_what_was_added_and_reused(told):
+    first, last = told[2]["moments"]
+    assert [f for f in first["factors"] if f[2]] == [[0, 7, "beacon"]]
+    assert [f for f in last["factors"] if f[2]] == [[38, 45, "beacon"]]
+    assert [0, 0, None] in first["factors"] and [45, 45, None] in last["factors"]
+    assert not any(first["tree"]["reused"])
+    assert len(last["tree"]["parents"]) == len(last["tree"]["sizes"]) == len(last["tree"]["reused"])
+
+
+def test_what_is_streamed_has_a_row_of_every_subject_at_every_moment(told):
+    partials = []
+    algorithm("sas_static").run(told[0], lambda _, partial: partials.append(partial))
+    for partial in partials:
+        assert set(partial["mean"]) == set(partial["cov"]) == set(NAMES)
+        assert all(len(rows) == len(partial["time_s"]) for what in ("mean", "cov") for rows in partial[what].values())
+    assert [p["time_s"][0] for p in partials] == [m["time_s"] for m in told[2]["moments"]]
