@@ -76,7 +76,8 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
             told: dict[str, Any] = {}
             if trial == mission.trials[0]:
                 told["tree"] = told_tree(step.tree, step.reused)
-                told["factors"] = told_factors(growth.factors, {name(k): k for k in range(growth.pose + 1)})
+                numbers = {name(k): k for k in range(growth.pose + 1)}
+                told["factors"] = told_factors(growth.factors, numbers, mission.beacons)
             for factor in growth.factors if told else ():
                 if isinstance(factor, SyntheticAperture):
                     at = np.stack([beliefs[v][:, :2].mean(0) for v in factor.variables[:-1]])

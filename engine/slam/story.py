@@ -7,7 +7,7 @@ added, tree {parents, sizes, reused} or null, array {places_m, look_rad, beam, r
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -33,13 +33,13 @@ def told_beliefs(beacons: dict[str, np.ndarray], seed: int) -> dict[str, Any]:
     return {"beacons": told, "divergence": apart}
 
 
-def told_factors(factors: Iterable[Factor], pose_of: Mapping[str, int]) -> list[list[Any]]:
+def told_factors(factors: Iterable[Factor], pose_of: Mapping[str, int], beacons: Container[str]) -> list[list[Any]]:
     """The poses [first, last] that each fix and each measurement is about, and the beacon it ties them to, if any."""
     told = []
     for factor in factors:
         poses = [pose_of[v] for v in factor.variables if v in pose_of]
-        beacon = next((v for v in factor.variables if v not in pose_of), None)
-        if beacon is not None or len(factor.variables) == 1:
+        beacon = next((v for v in factor.variables if v in beacons), None)
+        if poses and (beacon is not None or len(factor.variables) == 1):
             told.append([min(poses), max(poses), beacon])
     return told
 

@@ -82,6 +82,15 @@ def test_the_story_names_what_was_added_and_reused(told):
     assert len(last["tree"]["parents"]) == len(last["tree"]["sizes"]) == len(last["tree"]["reused"])
 
 
+@pytest.mark.parametrize("name", ["sas_dynamic", "range_only"])
+def test_others_tell_their_measurements_too(name):
+    mission = fly(scenario(duration_s=45.0, ranging={"count": 5}, arrays={"count": 2}), [0])
+    moments = algorithm(name).run(mission, silent).graph["moments"]
+    told = [f for m in moments for f in m["factors"]]
+    assert sum(f[2] == "beacon" for f in told) == (2 if name == "sas_dynamic" else 5)
+    assert sorted(f[:2] for f in told if f[2] is None) == [[0, 0], [45, 45]]
+
+
 def test_what_is_streamed_has_a_row_of_every_subject_at_every_moment(told):
     partials = []
     algorithm("sas_static").run(told[0], lambda _, partial: partials.append(partial))
