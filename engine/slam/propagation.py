@@ -63,11 +63,11 @@ class Points:
 
 @dataclass(frozen=True)
 class Up:
-    """An up-pass: the conditionals by clique, the log evidence (1 or N,), and which cliques were not done again."""
+    """An up-pass: the conditionals by clique, the log evidence (1 or N,), and the number of each clique's message."""
 
     conditionals: list[Conditional]
     log_evidence: np.ndarray
-    reused: frozenset[int]
+    messages: dict[int, int]
 
 
 class Propagation:
@@ -75,7 +75,8 @@ class Propagation:
 
     def __init__(self) -> None:
         self._kept: dict[tuple, tuple[Conditional, Message]] = {}
-        self._numbers = count()
+        #: How many messages were made; a clique is done anew whenever its own is.
+        self.made = 0
 
     def up(self, graph: Graph, tree: BayesTree, points: Points, given: frozenset[str]) -> Up:
         """From the leaves to the roots, with the variables `given` (the kernels' own) held at their points."""
@@ -91,7 +92,7 @@ class Propagation:
         conditionals: list[Conditional] = [None] * len(tree.cliques)  # type: ignore[list-item]
         incoming: list[list[tuple[tuple[str, ...], Message]]] = [[] for _ in tree.cliques]
         kept: dict[tuple, tuple[Conditional, Message]] = {}
-        reused: set[int] = set()
+        messages: dict[int, int] = {}
         for i in reversed(range(len(tree.cliques))):
             clique = tree.cliques[i]
             frontals = [v for v in clique.frontals if v not in given]
@@ -107,19 +108,18 @@ class Propagation:
                 tuple((v, points.versions[v]) for v in touched),
             )
             found = self._kept.get(key)
-            if found is not None:
-                reused.add(i)
-            else:
+            if found is None:
                 found = self.eliminate(graph, frontals, separator, homes[i], incoming[i], points, given)
             kept[key] = found
             conditionals[i], message = found
+            messages[i] = message.number
             if separator:
                 assert clique.parent is not None
                 incoming[clique.parent].append((separator, message))
             else:
                 evidence = evidence + message.const
         self._kept = kept
-        return Up(conditionals, evidence, frozenset(reused))
+        return Up(conditionals, evidence, messages)
 
     def eliminate(
         self,
@@ -179,7 +179,8 @@ class Propagation:
         const = const - np.log(np.diagonal(low, axis1=-2, axis2=-1)).sum(-1)
         rest = Lam[:, F:, F:] - np.swapaxes(Lam[:, :F, F:], -1, -2) @ G
         onward = eta[:, F:] - (np.swapaxes(G, -1, -2) @ eta[:, :F, None])[..., 0]
-        message = Message(next(self._numbers), 0.5 * (rest + np.swapaxes(rest, -1, -2)), onward, const)
+        self.made += 1
+        message = Message(self.made, 0.5 * (rest + np.swapaxes(rest, -1, -2)), onward, const)
         return Conditional(m, G, half), message
 
 

@@ -96,7 +96,7 @@ class Solver:
 
     def extend(self, kinds: dict[str, Kind], factors: Iterable[Factor]) -> Step:
         """Add variables and factors and bring the beliefs up to date."""
-        added = list(factors)
+        added, made = list(factors), self._propagation.made
         self.graph.add(kinds, added)
         self._given = frozenset(self.graph.ambiguous())
         wanted = self.kernels
@@ -110,7 +110,8 @@ class Solver:
         weights = self._evidence - before - log_q
         weights = np.exp(weights - weights.max())
         effective = float(weights.sum() ** 2 / np.square(weights).sum())
-        grown, reused = self.tree, self._up.reused if self._up else frozenset()
+        grown, messages = self.tree, self._up.messages if self._up else {}
+        reused = frozenset(clique for clique, number in messages.items() if number <= made)
         accepted = 0.0
         self.kernels = wanted
         if self._given:

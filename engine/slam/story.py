@@ -1,8 +1,8 @@
 """What SLAM tells of its first trial, for people to look into: beliefs, beams, records and the tree as they grew.
 
 All in JSON's own types and of bounded size: `moments` in order of time, each {time_s, beacons {name: {points_m,
-bandwidth_m}}, divergence {name: nats}, pose, factors [[first pose, last pose, beacon, or null of a fix]] that were
-added, tree {parents, sizes, reused} or null, array {places_m, look_rad, beam, ranges_m, records} or null}.
+bandwidth_m, mode_m}}, divergence {name: nats}, pose, factors [[first pose, last pose, beacon, or null of a fix]] that
+were added, tree {parents, sizes, reused} or null, array {places_m, look_rad, beam, ranges_m, records} or null}.
 """
 
 from __future__ import annotations
@@ -23,12 +23,16 @@ POINTS, LOOKS, COLUMNS, CLIQUES = 150, 120, 160, 1500
 
 
 def told_beliefs(beacons: dict[str, np.ndarray], seed: int) -> dict[str, Any]:
-    """Kernels (N, 2) of each beacon, their bandwidths, and how far the belief is from a Gaussian (C19 eq. 5.3)."""
+    """Kernels (N, 2), bandwidths and densest place of each beacon; how far it is from a Gaussian (C19 eq. 5.3)."""
     told, apart = {}, {}
     for name, points in beacons.items():
         kde = fit(points)
         kept = points[np.linspace(0, len(points) - 1, min(len(points), POINTS)).round().astype(int)]
-        told[name] = {"points_m": _rounded(kept, 2), "bandwidth_m": _rounded(kde.bandwidth, 4)}
+        told[name] = {
+            "points_m": _rounded(kept, 2),
+            "bandwidth_m": _rounded(kde.bandwidth, 4),
+            "mode_m": _rounded(kde.mode, 2),
+        }
         apart[name] = round(from_gaussian(kde, np.random.default_rng(seed)), 3)
     return {"beacons": told, "divergence": apart}
 

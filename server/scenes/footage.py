@@ -65,7 +65,7 @@ class Footage:
     def points(self) -> np.ndarray:
         """All positions there are (N, 2) m, for the extent."""
         parts = list(self.truth.values()) + [m for t in self.tracks.values() for m in t.mean.values()]
-        return np.concatenate([np.zeros((0, 2)), *parts])
+        return np.concatenate([np.zeros((0, 2)), *parts, *(sound.points() for sound in self.sounds.values())])
 
 
 def footage(view: dict[str, Any], algorithms: list[str]) -> Footage:

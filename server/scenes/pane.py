@@ -153,6 +153,9 @@ class Pane:
             for name in algorithms
             for track in (footage.tracks[name],)
         }
+        for name in now.keys() & footage.sounds.keys() if options.sound else ():
+            modes = footage.sounds[name].modes(moment_s)
+            now[name] = {s: modes.get(s, place) for s, place in now[name].items() if s in modes or self._moves(s)}
         truth = {s: at(footage.time_s, p, moment_s) for s, p in footage.truth.items() if s not in without}
         first = now[algorithms[0]] if algorithms else {}
         with self._lock, self.server.atomic():
@@ -202,12 +205,13 @@ class Pane:
         self._lines("/ellipses", rings if options.ellipses else [], shades, 1.2)
 
     def _present(self, moment_s: float, now: Mapping[str, Places], truth: Places, options: Options) -> None:
-        """The present ellipses, and from every estimate a line to the truth."""
+        """The present ellipses, and from every estimate a line to the truth; not where lines of density tell more."""
         lines, colours = [], []
         for algorithm, places in now.items():
             track = self.footage.tracks[algorithm]
             for n, name in enumerate(self.footage.names):
-                if name not in places:
+                heard = options.sound and algorithm in self.footage.sounds and not self._moves(name)
+                if name not in places or heard:
                     continue
                 mean, depth = places[name], self._depth(name)
                 cov = at(track.time_s, track.cov[name], moment_s)
@@ -315,7 +319,7 @@ class Pane:
             extent = float(np.ptp(self.footage.points(), axis=0).max())
             depths = {name: self._depth(name) for name in names}
             drawn = sound.drawing(found, moment_s, self._chart, self._look, names, depths, extent)
-        self._lines("/sound/density", drawn.levels, drawn.level_colours, 1.8)
+        self._lines("/sound/density", drawn.levels, drawn.level_colours, 2.2)
         self._lines("/sound/beams", drawn.beams, drawn.beam_colours, 1.4)
 
     def _place(self, now: Places, truth: Places) -> None:

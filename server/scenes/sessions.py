@@ -218,7 +218,7 @@ class Session:
     async def _stage(self, new: Footage) -> None:
         """Take new footage; send what stands still unless the panes have it already."""
         async with self._drawing:
-            wanted = self._chart if self._chart and new.truth else self._charted(new)
+            wanted = self._chart if self._chart and new.truth and not new.sounds else self._charted(new)
             if self._chart is None or wanted != self._chart:
                 self._chart = wanted
                 await _undisturbed(self._stage_panes, new, wanted)

@@ -13,7 +13,7 @@ from server.scenes.ensemble import contours
 from server.scenes.geometry import Chart, segments
 
 #: Shares of a belief inside its lines (C19 Figs. 5-10 to 5-17), and how faint each is drawn.
-SHARES, FAINT = (0.8, 0.6, 0.4, 0.2), (0.6, 0.4, 0.2, 0.0)
+SHARES, FAINT = (0.8, 0.6, 0.4, 0.2), (0.36, 0.24, 0.12, 0.0)
 #: Length of a beam's main lobe, as a share of the scene's extent.
 BEAM = 0.16
 #: Beams of arrays before the newest are drawn this faint.
@@ -26,6 +26,21 @@ class Sound:
 
     time_s: np.ndarray
     moments: list[dict[str, Any]]
+
+    def last(self, moment_s: float) -> int:
+        """The number of the last moment until then, -1 before the first."""
+        return int(np.searchsorted(self.time_s, moment_s + 1e-9, side="right")) - 1
+
+    def modes(self, moment_s: float) -> dict[str, np.ndarray]:
+        """The densest place (2,) m of each beacon."""
+        last = self.last(moment_s)
+        told = self.moments[last]["beacons"] if last >= 0 else {}
+        return {name: np.array(belief["mode_m"], float) for name, belief in told.items()}
+
+    def points(self) -> np.ndarray:
+        """All places (N, 2) m that were believed in."""
+        told = [belief["points_m"] for moment in self.moments for belief in moment["beacons"].values()]
+        return np.concatenate([np.zeros((0, 2)), *(np.array(points, float) for points in told)])
 
 
 @dataclass(frozen=True)
@@ -54,7 +69,7 @@ def drawing(
 ) -> Drawing:
     """Beliefs as of the last moment told, and the beams of all arrays until then, the newest strongest."""
     drawn = Drawing([], [], [], [])
-    last = int(np.searchsorted(sound.time_s, moment_s + 1e-9, side="right")) - 1
+    last = sound.last(moment_s)
     if last < 0:
         return drawn
     for name, belief in sound.moments[last]["beacons"].items():

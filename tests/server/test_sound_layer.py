@@ -67,6 +67,13 @@ def test_lines_hold_their_share_of_the_belief(told):
     assert (inner.min(0) >= outer.min(0) - 1e-9).all() and (inner.max(0) <= outer.max(0) + 1e-9).all()
 
 
+def test_the_densest_place_is_one_of_those_believed_in(told):
+    found = sound.read(told[2])
+    assert found.modes(-1.0) == {}
+    mode = found.modes(float(found.time_s[-1]))["beacon"]
+    assert np.linalg.norm(found.points() - mode, axis=1).min() < 1.0
+
+
 def test_arrays_before_stay_faint(told):
     drawn = drawing(told, told[2]["moments"][-1]["time_s"])
     assert len(drawn.beams) == 4

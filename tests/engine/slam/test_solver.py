@@ -206,3 +206,16 @@ def alone(factor, known: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     *before, name = factor.variables
     values = [known[v] for v in before] + [np.zeros((4000, 3))]
     return {name: factor.sample(len(before), values, np.zeros(4000), np.random.default_rng(len(name) + len(known)))}
+
+
+def test_what_an_extension_does_not_touch_is_not_done_again():
+    """Messages from the far end of a chain stay; in the first extension there is nothing to stay."""
+    solver = Solver(20, seed=1)
+    cov = 0.01 * np.eye(2)
+    steps = [displacement(f"x{k}", f"x{k + 1}", POINT2, np.ones(2), cov) for k in range(30)]
+    begun = solver.extend({f"x{k}": POINT2 for k in range(30)}, [prior("x0", POINT2, np.zeros(2), cov), *steps[:29]])
+    assert not begun.reused
+    grown = solver.extend({"x30": POINT2}, [steps[29]])
+    home = grown.tree.home
+    assert {home[f"x{k}"] for k in range(10)} <= grown.reused
+    assert home["x30"] not in grown.reused
