@@ -1,6 +1,7 @@
 // Puts the page together: reads the library, follows the address, connects panes to their scenes.
 
 import { mountScorecard } from "./claims/scorecard.js";
+import { mountHelp } from "./help.js";
 import { listenKeys } from "./keyboard.js";
 import { mountAlgorithms } from "./library/algorithms.js";
 import { mountLaunch } from "./library/launch.js";
@@ -68,6 +69,7 @@ mountClaims();
 mountRuns();
 mountScorecard();
 listenKeys(window);
+mountHelp();
 
 store.watch(["run", "room"], ({ run, room }) => (part("workbench").hidden = run === null || room !== "workbench"));
 
