@@ -11,6 +11,8 @@ from playwright.sync_api import Page
 from tests.browser.serving import until
 
 Rgb = tuple[int, int, int]
+#: The water in a pane.
+WATER = np.array([243.0, 247.0, 250.0])
 
 
 def pixels(page: Page, algorithm: str) -> np.ndarray:
@@ -19,9 +21,16 @@ def pixels(page: Page, algorithm: str) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
 
 
-def count(image: np.ndarray, colour: Rgb, tolerance: int = 40) -> int:
-    """How many pixels have a colour, or nearly so: the water's surface pales what is seen through it."""
-    return int((np.abs(image - np.array(colour)).max(axis=-1) <= tolerance).sum())
+def count(image: np.ndarray, colour: Rgb, off: float = 30.0) -> int:
+    """How many pixels have a colour, or pale with the water's: thin lines, and what is seen through its surface.
+
+    The pixels' share of the colour is 0.4 or more, more than the grid's of blue; `off` is how far they may be from
+    the straight line between the two colours.
+    """
+    towards = np.array(colour, float) - WATER
+    share = (image - WATER) @ towards / (towards @ towards)
+    away = np.linalg.norm(image - WATER - share[..., None] * towards, axis=-1)
+    return int(((share > 0.4) & (share < 1.2) & (away <= off)).sum())
 
 
 def vehicle_colours(page: Page) -> list[Rgb]:

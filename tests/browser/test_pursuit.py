@@ -45,9 +45,9 @@ def test_formation_and_hyperbolas_are_a_layer_that_can_be_switched(page: Page, c
     layer.uncheck()
 
     def drawn(name: str) -> int:
-        """Pixels about as orange or green as the hyperbolas; a busy browser draws coarsely."""
+        """Pixels as orange or green as the hyperbolas."""
         image = eyes.pixels(page, name)
-        return sum(eyes.count(image, colour, tolerance=80) for colour in eyes.vehicle_colours(page)[1:3])
+        return sum(eyes.count(image, colour) for colour in eyes.vehicle_colours(page)[1:3])
 
     def steady() -> list[int] | None:
         before, after = ([drawn(name) for name in NAMES] for _ in range(2))

@@ -38,7 +38,7 @@ def test_beliefs_are_a_layer_that_can_be_switched(page: Page, heard: str, keep):
 
     def drawn() -> int:
         """Pixels about as orange as the beacon's ellipse, or its lines of equal density; those are few."""
-        return eyes.count(eyes.pixels(page, NAMES[0]), beacon, tolerance=110)
+        return eyes.count(eyes.pixels(page, NAMES[0]), beacon)
 
     until(lambda: 15 < drawn() < 300, "the lines of equal density")
     keep(page)
