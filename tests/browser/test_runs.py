@@ -98,6 +98,7 @@ def test_a_run_is_run_again_as_it_was(page: Page, server: Server, lossy: str):
     page.goto("/#room=runs")
     row(page, lossy).get_by_role("button", name=re.compile("^Run .* again$")).click()
     expect(page.locator("#headline .state")).to_have_attribute("data-state", "done", timeout=60_000)
+    expect(page).to_have_url(re.compile("run=[0-9a-f]+"))
     id = re.search("run=([0-9a-f]+)", page.url)
     assert id and id[1] != lossy
     first, second = (server.get(f"/api/jobs/{i}/result")["algorithms"]["cekf"]["subjects"] for i in (lossy, id[1]))
