@@ -29,7 +29,9 @@ TELL_S = 0.25
 
 _lock = threading.Lock()
 _at_work: dict[str, int] = {}
-_stopped: set[str] = set()
+#: The keys last stopped, in order: one that comes to its worker after that does not begin.
+_stopped: dict[str, None] = {}
+STOPPED_KEPT = 1000
 
 
 @dataclass(frozen=True)
@@ -76,13 +78,16 @@ class Prepared(WorkerPlugin):
 def stop(key: str) -> bool:
     """Stop the run of that key in this process; whether it is still at work.
 
-    It ends at its next sign of life, or between two steps of Python: a mission being flown gives no signs.
+    It ends at its next sign of life, or between two steps of Python: a mission being flown gives no signs. One that has
+    not come yet does not begin.
     """
     with _lock:
         thread = _at_work.get(key)
         if thread is not None and key not in _stopped:
-            _stopped.add(key)
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(Stopped))
+        _stopped[key] = None
+        if len(_stopped) > STOPPED_KEPT:
+            del _stopped[next(iter(_stopped))]
         return thread is not None
 
 
@@ -125,6 +130,8 @@ def run(topic: str, key: str, piece: Piece) -> Answer | None:
 
     try:
         with _lock:
+            if key in _stopped:
+                return None
             _at_work[key] = threading.get_ident()
         scenario = toml.loads(piece.text, origin=piece.origin)
         tell(0.0)
@@ -139,7 +146,6 @@ def run(topic: str, key: str, piece: Piece) -> Answer | None:
     finally:
         with _lock:
             _at_work.pop(key, None)
-            _stopped.discard(key)
 
 
 def outline(scenario: ScenarioBase) -> dict[str, Any]:

@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 from distributed.diagnostics.plugin import WorkerPlugin
 
+from engine.runner import Shard
+from engine.scenario.errors import ScenarioError
+from server import work
 from server.settings import Settings
+from server.work import Piece
 from tests.server.living import LONG, SHORT, Live, start, until
 
 MANY = SHORT | {"trials": 100, "algorithms": ["dead_reckoning", "cekf", "nekf"]}
@@ -113,6 +117,15 @@ def test_cancelling_frees_a_worker_that_gives_no_sign_of_life(spoilt: Callable[[
     until(lambda: not flow._busy, "free workers")
     live.done(SHORT)
     assert live.job(id)["state"] == "cancelled"
+
+
+def test_a_run_that_is_stopped_before_it_came_to_its_worker_does_not_begin(monkeypatch):
+    monkeypatch.setattr(work, "get_worker", lambda: None)
+    piece = Piece("job", 0, "no scenario", "test", Shard("cekf", (0,)))
+    with pytest.raises(ScenarioError):
+        work.run("topic", "early", piece)
+    assert not work.stop("late")
+    assert work.run("topic", "late", piece) is None
 
 
 def test_a_job_whose_time_is_up_is_ended_and_says_so(fragile: Live):
