@@ -18,6 +18,7 @@ from engine.slam.building import growths
 from engine.slam.log import SlamLog
 from engine.slam.mission import SlamMission, fly
 from engine.slam.solver import Solver
+from tests.engine.slam.test_solver import nested_sampling_graph
 
 #: C19 section 4.5: the sizes that must run while one watches.
 POSES, ARRAYS, ELEMENTS = 400, 22, 8
@@ -86,3 +87,13 @@ def test_growth_with_poses_and_factors():
     power = np.polyfit(np.log([a for _, a in sizes]), np.log([s for s, _ in spent]), 1)[0]
     told = ", ".join(f"{p} poses and {a} arrays {s:.1f} s" for (p, a), (s, _) in zip(sizes, spent, strict=True))
     print(f"\n{told}: grows as the size to the {power:.2f}; the last factors took {[round(t, 2) for _, t in spent]} s")
+
+
+def test_six_steps_of_the_nested_sampling_graph(recorded_data):
+    start = time.perf_counter()
+    solver = Solver(500, 11, sweeps=6)
+    for kinds, factors in nested_sampling_graph(recorded_data("nested-sampling")):
+        solver.extend(kinds, factors)
+        solver.beliefs()
+    elapsed = time.perf_counter() - start
+    print(f"\nnested-sampling graph, six steps: {elapsed:.1f} s (under 5 wanted; NF-iSAM 14-32, mm-iSAM 111-287)")

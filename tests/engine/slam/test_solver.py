@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import cdist
 
 from engine.slam.factors.mixture import mixture
 from engine.slam.factors.odometry import displacement, pose_odometry
@@ -193,12 +194,51 @@ def test_posteriors_of_nested_sampling_are_met(recorded_data):
             column += theirs.shape[1]
             scale = np.maximum(np.abs(theirs.mean(0)), theirs.std(0))
             np.testing.assert_array_less(np.abs(ours.mean(0) - theirs.mean(0)), 0.15 * scale, err_msg=f"{k} {name}")
+            if not name.startswith("X"):
+                assert discrepancy(ours, theirs) < 0.1, f"{name} at step {k}"
             spread = dead_reckoned[name].std(0) if name.startswith("X") else theirs.std(0)
             np.testing.assert_allclose(ours.std(0), spread, rtol=0.15, err_msg=f"{k} {name}")
             if name.startswith("L"):
                 for axis, middle in ((0, 30.0 if name == "L1" else 60.0), (1, 0.0)):
                     share = (ours[:, axis] > middle).mean() - (theirs[:, axis] > middle).mean()
                     assert abs(share) < 0.1, f"mass of {name} at step {k}"
+
+
+def test_later_steps_agree_with_a_long_run_from_nothing(recorded_data):
+    """Steps 4 and 5, of which there are no samples: grown step by step, against four times the kernels at once."""
+    kinds: dict[str, Kind] = {}
+    factors: list = []
+    solver = Solver(500, 11, sweeps=6)
+    for k, (more, said) in enumerate(nested_sampling_graph(recorded_data("nested-sampling"))):
+        solver.extend(more, said)
+        kinds |= more
+        factors += said
+        if k < 4:
+            continue
+        long = Solver(2000, 5, sweeps=20)
+        long.extend(kinds, factors)
+        drawn = solver.beliefs()
+        for name, theirs in long.beliefs().items():
+            ours = drawn[name]
+            scale = np.maximum(np.abs(theirs.mean(0)), theirs.std(0))
+            np.testing.assert_array_less(np.abs(ours.mean(0) - theirs.mean(0)), 0.15 * scale, err_msg=f"{k} {name}")
+            np.testing.assert_allclose(ours.std(0), theirs.std(0), rtol=0.15, err_msg=f"{k} {name}")
+            assert discrepancy(ours, theirs) < 0.1, f"{name} at step {k}"
+
+
+def discrepancy(a: np.ndarray, b: np.ndarray) -> float:
+    """Maximum mean discrepancy of the places in two sets of draws; Gaussian kernel as wide as their median distance.
+
+    Independent draws of the same, 500 and 2000, have one of about sqrt(1/500 + 1/2000) = 0.05.
+    """
+    rng = np.random.default_rng(0)  # nested sampling writes its samples in order
+    a, b = (rng.permutation(x)[:2000, :2] for x in (a, b))
+    width = np.median(cdist(a, b))
+
+    def near(x: np.ndarray, y: np.ndarray) -> float:
+        return np.exp(-0.5 * (cdist(x, y) / width) ** 2).mean()
+
+    return float(np.sqrt(max(near(a, a) + near(b, b) - 2 * near(a, b), 0.0)))
 
 
 def alone(factor, known: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
