@@ -24,6 +24,8 @@ def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
     poses = reckon(log, N, rng)
     densities: dict[str, list[Kde]] = {}
     beacons: dict[str, np.ndarray] = {}
+    if not log.arrays:
+        yield Moment(log.poses - 1, poses[-1], {}, 1.0, poses)
     for n, a in enumerate(log.arrays, start=1):
         elements = np.swapaxes(poses[list(a.poses)], 0, 1)
         strata = rng.permutation((np.arange(N) + 0.5) / N)

@@ -52,10 +52,13 @@ def name(pose: int) -> str:
 
 
 def growths(log: SlamLog, plan: Plan, time_s: np.ndarray, outlier_share: float) -> Iterator[Growth]:
-    """The graph, piece by piece: each ends with measurements of a beacon, the last at the last pose."""
+    """The graph, piece by piece: each ends with measurements of a beacon, the last at the last pose.
+
+    Where nothing was measured it is one piece.
+    """
     kind = _kind(log, plan)
     slack = _slack(log, plan)
-    events = _events(log, plan, slack, outlier_share)
+    events = _events(log, plan, slack, outlier_share) or [(log.poses - 1, [])]
     known: set[str] = set()
     reached = -1
     for n, (pose, factors) in enumerate(events):

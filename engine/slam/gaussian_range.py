@@ -53,7 +53,7 @@ def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
         draws = _settle(graph, points, options.kernels, rng)
         beacons = {b: draws[b] for b in mission.beacons if b in draws}
         poses = np.stack([draws[name(k)][:, :2] for k in range(log.poses)]) if done == total else None
-        yield Moment(growth.pose, draws[name(growth.pose)][:, :2], beacons, done / total, poses)
+        yield Moment(growth.pose, draws[name(growth.pose)][:, :2], beacons, done / total if total else 1.0, poses)
 
 
 def _unimodal(factor: Factor) -> Factor:

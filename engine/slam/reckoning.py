@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from engine.slam.log import SlamLog
@@ -29,3 +31,10 @@ def reckon(log: SlamLog, draws: int, rng: np.random.Generator) -> np.ndarray:
         if k in fixed:
             out[k] = log.fix_m[k] + log.fix_sigma_m * rng.standard_normal((draws, 2))
     return out
+
+
+def drifted(log: SlamLog) -> np.ndarray:
+    """The track (P, 2) that odometry tells of from fix to fix, taken at its word."""
+    start_cov = None if log.start_cov is None else np.zeros_like(log.start_cov)
+    word = replace(log, step_cov=np.zeros_like(log.step_cov), fix_sigma_m=0.0, start_cov=start_cov)
+    return reckon(word, 1, np.random.default_rng(0))[:, 0]

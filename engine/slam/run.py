@@ -16,6 +16,7 @@ from engine.slam.densities import fit, from_gaussian
 from engine.slam.factors.synthetic_aperture import SyntheticAperture
 from engine.slam.log import SlamLog, thinned
 from engine.slam.mission import SlamMission
+from engine.slam.reckoning import drifted
 from engine.slam.solver import Misfit, Solver
 from engine.slam.story import told_array, told_beliefs, told_factors, told_tree
 from engine.tracks import Belief, Samples, Series, Tracks
@@ -66,7 +67,7 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
         log = thinned(log, options.measurements)
         seed = np.random.SeedSequence([mission.scenario.seed, trial])
         solver = Solver(options.kernels, seed, options.sweeps, options.lag)
-        total = max(len(log.arrays) if plan.measurements == "arrays" else len(log.pings) + len(log.readings), 1)
+        total = len(log.arrays) if plan.measurements == "arrays" else len(log.pings) + len(log.readings)
         done = 0
         for growth in growths(log, plan, mission.time_s, mission.scenario.outlier_share):
             step = solver.extend(growth.kinds, growth.factors)
@@ -124,15 +125,17 @@ def over_trials(solve: Solve) -> Callable[[SlamMission, Progress], Tracks]:
     """An algorithm that solves trial by trial."""
 
     def run(mission: SlamMission, progress: Progress) -> Tracks:
-        histories = []
+        histories, track = [], np.empty((0, 2))
         for k, trial in enumerate(mission.trials):
-            history = []
-            for moment in solve(mission.log(k), mission, trial):
+            history, log = [], mission.log(k)
+            if k == 0:
+                track = drifted(log)
+            for moment in solve(log, mission, trial):
                 partial = _partial(mission, moment) if k == 0 else None
                 progress((k + moment.done) / len(mission.trials), partial)
                 history.append(moment)
             histories.append(history)
-        return _tracks(mission, histories)
+        return _tracks(mission, histories, track)
 
     return run
 
@@ -159,15 +162,17 @@ def _moments(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mean, np.einsum("...ni,...nj->...ij", d, d) / (points.shape[-2] - 1) + 1e-9 * np.eye(2)
 
 
-def _tracks(mission: SlamMission, histories: list[list[Moment]]) -> Tracks:
+def _tracks(mission: SlamMission, histories: list[list[Moment]], track: np.ndarray) -> Tracks:
     T = len(mission.time_s)
     ends = [_moments(h[-1].last) for h in histories if h[-1].last is not None]
     beliefs = {mission.vehicle: Belief(np.stack([m for m, _ in ends]), np.stack([c for _, c in ends]))}
     samples: dict[str, Samples] = {}
     series: dict[str, Series] = {}
+    silent: list[str] = []
     for beacon in mission.beacons:
         heard = [[m for m in h if beacon in m.beacons] for h in histories]
         if not all(heard):
+            silent.append(f"{beacon} was not heard by what this algorithm listens to; it has no belief")
             continue
         poses = [m.pose for m in heard[0]]
         points = np.stack([[m.beacons[beacon] for m in h] for h in heard])
@@ -179,8 +184,11 @@ def _tracks(mission: SlamMission, histories: list[list[Moment]]) -> Tracks:
         series |= _curves(mission, beacon, points, held)
     series |= _misfit(mission.vehicle, [h[-1] for h in histories], T)
     notes = _doubts([h[-1] for h in histories])
-    story = {"moments": [_story(mission, moment) for moment in histories[0]]}
-    return Tracks(beliefs, samples=samples, series=series, notes=(*mission.notes, *notes), graph=story)
+    story = {
+        "moments": [_story(mission, moment) for moment in histories[0]],
+        "drifted": {"time_s": mission.time_s.tolist(), "points_m": track.tolist()},
+    }
+    return Tracks(beliefs, samples=samples, series=series, notes=(*mission.notes, *silent, *notes), graph=story)
 
 
 def _story(mission: SlamMission, moment: Moment) -> dict[str, Any]:

@@ -308,12 +308,12 @@ class Pane:
         self._lines("/pursuit/thin", drawn.thin, drawn.thin_colours, 1.2)
 
     def _sound(self, algorithms: Sequence[str], moment_s: float, wanted: bool) -> None:
-        """Beliefs of beacons and beams of arrays; nothing where there are none or they are off."""
+        """Beliefs of beacons, beams of arrays and the drifted track; nothing where there are none or they are off."""
         found = self.footage.sounds.get(algorithms[0]) if len(algorithms) == 1 and wanted else None
         if found is None and not self._sounded:
             return
         self._sounded = found is not None
-        drawn = sound.Drawing([], [], [], [])
+        drawn = sound.Drawing([], [], [], [], [], [])
         if found is not None:
             names = self.footage.names
             extent = float(np.ptp(self.footage.points(), axis=0).max())
@@ -321,6 +321,7 @@ class Pane:
             drawn = sound.drawing(found, moment_s, self._chart, self._look, names, depths, extent)
         self._lines("/sound/density", drawn.levels, drawn.level_colours, 2.2)
         self._lines("/sound/beams", drawn.beams, drawn.beam_colours, 1.4)
+        self._lines("/sound/drift", drawn.drifts, drawn.drift_colours, 1.4)
 
     def _place(self, now: Places, truth: Places) -> None:
         for n, name in enumerate(self.footage.names):

@@ -1,4 +1,4 @@
-"""The layer of a pane that shows localization by sound: lines of equal density of beacons, and the arrays' beams."""
+"""The layer of a pane that shows localization by sound: densities of beacons, the arrays' beams, the drifted track."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from server.scenes import palette
 from server.scenes.ensemble import contours
-from server.scenes.geometry import Chart, segments
+from server.scenes.geometry import Chart, dashes, segments
 
 #: Shares of a belief inside its lines (C19 Figs. 5-10 to 5-17), and how faint each is drawn.
 SHARES, FAINT = (0.8, 0.6, 0.4, 0.2), (0.36, 0.24, 0.12, 0.0)
@@ -18,14 +18,18 @@ SHARES, FAINT = (0.8, 0.6, 0.4, 0.2), (0.36, 0.24, 0.12, 0.0)
 BEAM = 0.16
 #: Beams of arrays before the newest are drawn this faint.
 PAST = 0.7
+#: The drifted track is drawn this faint.
+DRIFT = 0.35
 
 
 @dataclass(frozen=True)
 class Sound:
-    """Moments at time_s (K,), each with what was told of it."""
+    """Moments at time_s (K,), each with what was told of it; the track (P, 2) m by odometry, and its times (P,)."""
 
     time_s: np.ndarray
     moments: list[dict[str, Any]]
+    drift_s: np.ndarray
+    drifted: np.ndarray
 
     def last(self, moment_s: float) -> int:
         """The number of the last moment until then, -1 before the first."""
@@ -40,22 +44,30 @@ class Sound:
     def points(self) -> np.ndarray:
         """All places (N, 2) m that were believed in."""
         told = [belief["points_m"] for moment in self.moments for belief in moment["beacons"].values()]
-        return np.concatenate([np.zeros((0, 2)), *(np.array(points, float) for points in told)])
+        return np.concatenate([self.drifted, *(np.array(points, float) for points in told)])
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """Lines, each (M, 2, 3), with their colours: of densities, and of beams."""
+    """Lines, each (M, 2, 3), with their colours: of densities, of beams, and of the drifted track."""
 
     levels: list[np.ndarray]
     level_colours: list[palette.Rgb]
     beams: list[np.ndarray]
     beam_colours: list[palette.Rgb]
+    drifts: list[np.ndarray]
+    drift_colours: list[palette.Rgb]
 
 
 def read(told: Mapping[str, Any]) -> Sound:
     """The growth of beliefs that an algorithm tells of its first trial."""
-    return Sound(np.array([m["time_s"] for m in told["moments"]], float), list(told["moments"]))
+    drift = told.get("drifted", {"time_s": [], "points_m": []})  # runs kept before there was one
+    return Sound(
+        np.array([m["time_s"] for m in told["moments"]], float),
+        list(told["moments"]),
+        np.array(drift["time_s"], float),
+        np.array(drift["points_m"], float).reshape(-1, 2),
+    )
 
 
 def drawing(
@@ -67,8 +79,15 @@ def drawing(
     depths: Mapping[str, float],
     extent_m: float,
 ) -> Drawing:
-    """Beliefs as of the last moment told, and the beams of all arrays until then, the newest strongest."""
-    drawn = Drawing([], [], [], [])
+    """Beliefs as of the last moment told, the beams of all arrays until then, the newest strongest; the drift, dashed.
+
+    The drifted track is what odometry tells from fix to fix, which SLAM corrects (C19 Figs. 5-10 to 5-17).
+    """
+    drawn = Drawing([], [], [], [], [], [])
+    drift = chart.place(sound.drifted[sound.drift_s <= moment_s + 1e-9])
+    if len(drift) > 1:
+        drawn.drifts.append(dashes(drift))
+        drawn.drift_colours.append(look.faded(look.truth, DRIFT))
     last = sound.last(moment_s)
     if last < 0:
         return drawn

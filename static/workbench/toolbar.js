@@ -16,7 +16,7 @@ const TOGGLES = {
   rays: { label: "Rays", hint: "Packets: the sender's colour when heard, grey when lost" },
   graph: { label: "Graph", hint: "Factor graph of the chosen vehicle, smoothed: received poses solid, lost ones hollow, priors square, composed links as arcs" },
   pursuit: { label: "Formation", hint: "Waypoints, the formation kept and the one wanted (dashed), messages under way, and what the chosen vehicle knows: hyperbolas of equal time difference with two sigmas on either side" },
-  sound: { label: "Beliefs", hint: "Where beacons may be: lines that hold 20, 40, 60 and 80 % of the belief, and the beams of the arrays so far" },
+  sound: { label: "Beliefs", hint: "Where beacons may be: lines that hold 20, 40, 60 and 80 % of the belief, the beams of the arrays so far, and dashed the track by odometry alone" },
   follow: { label: "Follow", hint: "Keep the chosen vehicle in the middle" },
   top: { label: "From above", hint: "Look straight down, north up", solid: true },
 };

@@ -39,7 +39,23 @@ def unplaced(points: np.ndarray) -> np.ndarray:
 def test_nothing_is_drawn_before_the_first_measurement(told):
     first = told[2]["moments"][0]["time_s"]
     drawn = drawing(told, first - 1.0)
-    assert drawn == sound.Drawing([], [], [], [])
+    assert not drawn.levels and not drawn.beams
+    assert drawing(told, 0.0) == sound.Drawing([], [], [], [], [], [])
+
+
+def test_the_drifted_track_follows_odometry_from_fix_to_fix(told):
+    mission = told[0]
+    log = mission.log(0)
+    expected = [log.fix_m[0]]
+    for k, step in enumerate(log.steps, start=1):
+        expected.append(log.fix_m[k] if k in log.fixed else expected[-1] + step)
+    read = sound.read(told[2])
+    np.testing.assert_allclose(read.drifted, expected)
+    drawn = drawing(told, mission.time_s[20])
+    ends = unplaced(drawn.drifts[0])
+    assert np.abs(ends[0, 0] - read.drifted[0]).max() < 1e-6
+    assert np.linalg.norm(ends[:, 1] - read.drifted[20], axis=1).min() < 10.0
+    assert np.linalg.norm(ends[:, 1] - read.drifted[-1], axis=1).min() > 10.0
 
 
 def test_one_straight_array_draws_both_mirror_images_and_the_beam_points_at_them(told):
@@ -96,6 +112,17 @@ def test_others_tell_their_measurements_too(name):
     told = [f for m in moments for f in m["factors"]]
     assert sum(f[2] == "beacon" for f in told) == (2 if name == "sas_dynamic" else 5)
     assert sorted(f[:2] for f in told if f[2] is None) == [[0, 0], [45, 45]]
+
+
+@pytest.mark.parametrize(
+    "name", ["range_only", "gaussian_range", "sas_all_priors", "sas_static", "sas_dynamic", "beamform_only"]
+)
+def test_one_that_hears_nothing_reckons_on_and_says_so(name):
+    counts = {"count": 3} if "range" not in name else {"count": 0}
+    mission = fly(scenario(duration_s=45.0, ranging=counts, arrays={"count": 0 if counts["count"] else 2}), [0, 1])
+    tracks = algorithm(name).run(mission, silent)
+    assert set(tracks.beliefs) == {"auv"} and np.isfinite(tracks.beliefs["auv"].cov).all()
+    assert any("beacon was not heard" in note for note in tracks.notes)
 
 
 def test_what_is_streamed_has_a_row_of_every_subject_at_every_moment(told):
