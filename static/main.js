@@ -20,6 +20,7 @@ import { suspect } from "./state/connection.js";
 import { pickAgain, readLibrary } from "./state/library.js";
 import { mountLink } from "./state/link.js";
 import { keepPanesInLink, paneNames, paneState } from "./state/panes.js";
+import { startedByForm } from "./state/run.js";
 import { store } from "./state/store.js";
 import { isTrial } from "./state/whatif.js";
 import { mountStudies } from "./studies/studies.js";
@@ -91,7 +92,7 @@ let picked = null;
 store.watch(["job", "missions"], ({ job, missions }) => {
   if (!job || missions === null || job.id === picked) return;
   picked = job.id;
-  if (!isTrial(job.id)) pickAgain(job);
+  if (!startedByForm(job.id) && !isTrial(job.id)) pickAgain(job);
 });
 clock.watch(() => {
   if (shown !== null && clock.end > clock.start && !clock.following) session.seek(clock.time);

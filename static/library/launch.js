@@ -25,6 +25,8 @@ export function mountLaunch() {
       autocomplete: "off",
       spellcheck: "false",
       title: hint,
+      oninput: () => vary(key, entered(inputs[key])),
+      onblur: () => fill(store.state),
     });
     return el("label", { class: "field", for: `field-${key}` }, label, inputs[key]);
   });
@@ -47,7 +49,7 @@ export function mountLaunch() {
     sending = true;
     ready(store.state);
     try {
-      const started = await startRun(submission(inputs));
+      const started = await startRun(submission(inputs), { ofForm: true });
       if (started) part("stage").focus({ preventScroll: true });
     } finally {
       sending = false;
@@ -55,12 +57,19 @@ export function mountLaunch() {
     }
   });
 
-  store.watch(["mission", "missions", "varied"], ({ mission, missions, varied }) => {
-    const trials = varied.trials ?? missions?.find((m) => m.name === mission)?.trials;
-    inputs.trials.value = trials ? String(trials) : "";
-    inputs.seed.value = varied.seed === null ? "" : String(varied.seed);
-    inputs[LOSS].value = typeof varied.changes[LOSS] === "number" ? String(varied.changes[LOSS]) : "";
-    others.replaceChildren(...Object.entries(beyondFields(varied.changes)).map(change));
+  /** Fields show what a new run varies; one that is being emptied to be typed in anew stays empty. */
+  function fill({ mission, missions, varied }) {
+    const usual = { trials: missions?.find((m) => m.name === mission)?.trials };
+    for (const [key, input] of Object.entries(inputs)) {
+      const value = saidOf(varied, key) ?? usual[key] ?? null;
+      const emptied = input === document.activeElement && input.value === "" && saidOf(varied, key) === null;
+      if (!emptied && entered(input) !== value) input.value = value ?? "";
+    }
+  }
+
+  store.watch(["mission", "missions", "varied"], (state) => {
+    fill(state);
+    others.replaceChildren(...Object.entries(beyondFields(state.varied.changes)).map(change));
     others.hidden = !others.children.length;
   });
   store.watch(["scenario"], ({ scenario }) => {
@@ -83,23 +92,44 @@ export function mountLaunch() {
   });
 }
 
-/** The job that the form describes; what is not a number goes as it was typed, for the server to refuse. */
+/** What a field holds: a number, else the text as it was typed, for the server to refuse; null for nothing. */
+function entered(input) {
+  const text = input.value.trim();
+  if (text === "") return null;
+  return Number.isFinite(Number(text)) ? Number(text) : text;
+}
+
+/** What a new run varies under a field's key; null where it is the mission's own, or nothing that a field shows. */
+function saidOf(varied, key) {
+  if (key !== LOSS) return varied[key];
+  const loss = varied.changes[LOSS];
+  return loss === undefined || typeof loss === "object" ? null : loss;
+}
+
+/** Varies a new run as a person types, before there is a mission as well. */
+function vary(key, value) {
+  const { varied } = store.state;
+  if (key !== LOSS) store.set({ varied: { ...varied, [key]: value } });
+  else {
+    const { [LOSS]: _, ...others } = varied.changes;
+    store.set({ varied: { ...varied, changes: value === null ? others : { ...others, [LOSS]: value } } });
+  }
+}
+
+/** The job that the form describes. */
 function submission(inputs) {
   const { mission, ticked, varied } = store.state;
   const body = { scenario: mission, algorithms: ticked, set: beyondFields(varied.changes) };
-  const value = (key) => {
-    const text = inputs[key].value.trim();
-    return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
-  };
-  if (value("trials") !== "") body.trials = value("trials");
-  if (value("seed") !== "") body.seed = value("seed");
-  if (value(LOSS) !== "" && !inputs[LOSS].closest("label").hidden) body.set[LOSS] = value(LOSS);
+  const [trials, seed, loss] = ["trials", "seed", LOSS].map((key) => entered(inputs[key]));
+  if (trials !== null) body.trials = trials;
+  if (seed !== null) body.seed = seed;
+  if (loss !== null && !inputs[LOSS].closest("label").hidden) body.set[LOSS] = loss;
   return body;
 }
 
 /** Changes that no field of the form shows. */
 function beyondFields(changes) {
-  return Object.fromEntries(Object.entries(changes).filter(([key, value]) => key !== LOSS || typeof value !== "number"));
+  return Object.fromEntries(Object.entries(changes).filter(([key, value]) => key !== LOSS || typeof value === "object"));
 }
 
 /** A change in the mission that an earlier run brought along, with a button that drops it. */

@@ -44,8 +44,11 @@ export function scenarioOf(name) {
   return scenarios.get(name);
 }
 
-/** Picks a mission as it is or varied, and ticks its own algorithms or the given ones. */
-export function pickMission(name, ticked = null, varied = AS_IT_IS) {
+/**
+ * Picks a mission as it is or varied, and ticks its own algorithms or the given ones. The first one is varied as a person
+ * has said while the library was being read.
+ */
+export function pickMission(name, ticked = null, varied = store.state.mission === null ? store.state.varied : AS_IT_IS) {
   const entry = store.state.missions?.find((m) => m.name === name);
   const fitting = fittingAlgorithms(entry).map((a) => a.name);
   const own = (ticked ?? entry?.algorithms ?? []).filter((a) => fitting.includes(a));

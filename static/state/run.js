@@ -59,12 +59,23 @@ export function replaceRun(job, view, result) {
   return run;
 }
 
-/** Submits a run and opens it; a refusal is kept for the form. */
-export async function startRun(body) {
+/** Id of the run that the form has started last, until another is opened. */
+let ofTheForm = null;
+
+/** Whether a run that is opened is one that the form has just started: a person may be at the next one there. */
+export function startedByForm(id) {
+  const so = id === ofTheForm;
+  ofTheForm = null;
+  return so;
+}
+
+/** Submits a run, which the form for new ones may describe, and opens it; a refusal is kept for the form. */
+export async function startRun(body, { ofForm = false } = {}) {
   store.set({ refusal: null });
   const key = api.newKey();
   try {
     const job = await persist(() => api.submit(body, key));
+    if (ofForm) ofTheForm = job.id;
     openRun(job.id, { vehicle: store.state.vehicle }, job);
     return true;
   } catch (error) {

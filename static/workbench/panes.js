@@ -66,7 +66,8 @@ export function mountPanes(keys) {
       pane.root.style.setProperty("--stroke", lineStyle(name, algorithms ?? []).colour);
       if (pane.frame) pane.frame.title = `3D pane of ${known?.title ?? name}`;
       const metrics = result?.algorithms[name]?.subjects[vehicle];
-      pane.verdict.replaceChildren(...(metrics ? [verdictChip(metrics)] : []));
+      if (pane.metrics !== metrics) pane.verdict.replaceChildren(...(metrics ? [verdictChip(metrics)] : []));
+      pane.metrics = metrics;
       pane.tag.hidden = !known?.centralized;
       if (job === null) pane.reading.textContent = "";
     }

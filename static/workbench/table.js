@@ -60,7 +60,7 @@ export function mountTable() {
         : el("p", { class: "quiet" }, WAITING[job.state] ?? "Reading the result…"),
       ...notes(result, algorithms ?? []),
     );
-    if (focused) document.getElementById(focused)?.focus();
+    if (focused) document.getElementById(focused)?.focus({ preventScroll: true });
     choose(store.state);
   };
   const change = (values) => {

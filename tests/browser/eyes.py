@@ -52,6 +52,18 @@ def see_the_vehicles(page: Page, algorithms: list[str]) -> None:
         until(lambda name=algorithm: seen(name), f"the vehicles in the pane of {algorithm}")
 
 
+def settled(page: Page, algorithm: str) -> np.ndarray:
+    """The pane once nothing in it moves any more."""
+    seen = [pixels(page, algorithm)]
+
+    def still() -> bool:
+        seen.append(pixels(page, algorithm))
+        return difference(seen[-2], seen[-1]) == 0
+
+    until(still, f"a still pane of {algorithm}")
+    return seen[-1]
+
+
 def difference(one: np.ndarray, other: np.ndarray) -> float:
     """Share of the pixels that differ visibly."""
     return float((np.abs(one - other).max(axis=-1) > 30).mean())

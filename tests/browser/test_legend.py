@@ -7,7 +7,7 @@ import re
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.browser.eyes import count, pixels, see_the_vehicles, vehicle_colours
+from tests.browser.eyes import count, pixels, see_the_vehicles, settled, vehicle_colours
 from tests.browser.serving import until
 
 
@@ -56,7 +56,7 @@ def test_a_vehicle_is_hidden_everywhere(opened: Page):
     expect(opened.locator(".lane-keys")).not_to_contain_text("0 heard")
     chip(opened, "scout").click()
     until(lambda: count(pixels(opened, "cekf"), scout) == 0, "the scout to be gone from the pane")
-    assert count(pixels(opened, "cekf"), ship) >= 15
+    assert count(settled(opened, "cekf"), ship) >= 15
     expect(opened.locator("#table tr[data-subject=scout]")).to_have_count(0)
     expect(opened.locator("#table tr[data-subject=ship]")).to_have_count(3)
     expect(opened.locator(".plot .whose").first).to_have_text(" of ship")

@@ -14,7 +14,7 @@ from PIL import Image
 from playwright.sync_api import Locator, Page, expect
 from scipy.stats import chi2
 
-from tests.browser.serving import Server
+from tests.browser.serving import Server, until
 from tests.browser.test_time import now
 
 MEDIAN, MEAN, FIRST = "band", "mean", "first"
@@ -47,6 +47,11 @@ def axis(page: Page, quantity: str, which: str) -> tuple[float, float]:
         [quantity, which],
     )
     return low, high
+
+
+def drawn_as(page: Page, quantity: str, which: str, low: float, high: float) -> None:
+    """Wait until a plot's axis has a range; it is drawn a moment after it is asked for."""
+    until(lambda: axis(page, quantity, which) == pytest.approx((low, high), rel=1e-9), f"{which} {low} to {high}")
 
 
 @pytest.fixture(autouse=True)
@@ -91,12 +96,13 @@ def test_trials_are_a_median_with_a_band_or_a_mean_or_one(opened: Page, server: 
     telling.select_option(MEAN)
     expect(error.locator(".how")).to_have_text("RMS of 3 trials")
     expect(error.locator(".shapelayer path")).to_have_count(0)
-    assert drawn() == told["error_m"]
+    until(lambda: drawn() == told["error_m"], "the curve of the mean")
     expect(opened).to_have_url(re.compile("trials=mean"))
     telling.select_option(FIRST)
     expect(error.locator(".how")).to_have_text("the trial drawn")
     truth = np.array(view["truth"]["scout"], dtype=float)
-    np.testing.assert_allclose(drawn(), np.hypot(*(np.array(told["mean"]) - truth).T))
+    away = np.hypot(*(np.array(told["mean"]) - truth).T)
+    until(lambda: drawn() == pytest.approx(away), "the curve of the trial drawn")
     telling.select_option(MEDIAN)
     expect(error.locator(".shapelayer path")).to_have_count(3)
     keep(opened)
@@ -118,11 +124,15 @@ def test_an_axis_is_logarithmic_and_linear_again(opened: Page):
     button.click()
     expect(button).to_have_attribute("aria-pressed", "true")
     expect(opened).to_have_url(re.compile("log=error_m"))
-    low, high = axis(opened, "error_m", "yaxis")
-    assert 10**low > 0.001 and 10**high == pytest.approx(top, rel=0.5)
+
+    def logarithmic() -> bool:
+        low, high = axis(opened, "error_m", "yaxis")
+        return 10**low > 0.001 and 10**high == pytest.approx(top, rel=0.5)
+
+    until(logarithmic, "a logarithmic axis")
     button.click()
     expect(button).to_have_attribute("aria-pressed", "false")
-    assert axis(opened, "error_m", "yaxis")[1] == top
+    until(lambda: axis(opened, "error_m", "yaxis")[1] == top, "a linear axis again")
 
 
 def test_pointing_at_one_plot_points_at_all_of_them_and_at_the_slider(opened: Page, keep):
@@ -151,7 +161,8 @@ def test_brushing_a_plot_zooms_time_everywhere(opened: Page, keep):
     assert now(opened) == 1200, "time stays where it was"
     expect(opened).to_have_url(re.compile("zoom="))
     for quantity in ("error_m", "sigma_m"):
-        np.testing.assert_allclose(axis(opened, quantity, "xaxis"), np.array(span(opened)) / 60, rtol=1e-9)
+        low, high = span(opened)
+        drawn_as(opened, quantity, "xaxis", low / 60, high / 60)
     keep(opened)
 
     box = ground(opened, "sigma_m")

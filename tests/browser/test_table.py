@@ -89,6 +89,51 @@ def test_a_verdict_is_explained_in_a_sentence_on_focus(opened: Page, server: Ser
     expect(opened.get_by_role("tooltip")).to_be_hidden()
 
 
+#: Scrolls, and waits for the event that the browser makes of what comes to lie under a pointer that rests.
+SCROLL_UNDER_THE_POINTER = """dy => new Promise(done => {
+  const soon = () => requestAnimationFrame(() => requestAnimationFrame(done));
+  document.addEventListener("pointerover", soon, {once: true});
+  document.querySelector("#stage").scrollBy(0, dy);
+})"""
+
+
+def test_a_sentence_shown_by_focus_stays_until_the_focus_goes(opened: Page):
+    """What moves under a pointer that rests is not pointed at; a table drawn anew keeps focus and sentence."""
+    opened.locator("#table").scroll_into_view_if_needed()
+    opened.locator("#table h2").hover()
+    verdict = cell(opened, "cekf", "scout", ".verdict")
+    verdict.focus()
+    told = verdict.get_attribute("data-hint") or ""
+    tooltip = opened.get_by_role("tooltip")
+    expect(tooltip).to_have_text(told)
+    for dy in (-120, 120):
+        opened.evaluate(SCROLL_UNDER_THE_POINTER, dy)
+        expect(tooltip).to_have_text(told, timeout=1)
+    opened.emulate_media(color_scheme="dark")
+    opened.emulate_media(color_scheme="light")
+    expect(verdict).to_be_focused()
+    expect(tooltip).to_have_text(told)
+    other = cell(opened, "nekf", "scout")
+    other.hover()
+    expect(tooltip).not_to_have_text(told)
+    opened.mouse.move(5, 5)
+    expect(tooltip).to_have_text(told)
+    opened.locator("#stage").focus()
+    expect(tooltip).to_be_hidden()
+
+
+def test_a_sentence_can_be_pointed_at_and_put_away(opened: Page):
+    verdict = cell(opened, "cekf", "scout", ".verdict")
+    verdict.hover()
+    tooltip = opened.get_by_role("tooltip")
+    box = tooltip.bounding_box()
+    assert box
+    opened.mouse.move(box["x"] + 40, box["y"] + box["height"] / 2, steps=10)
+    expect(tooltip).to_be_visible()
+    opened.keyboard.press("Escape")
+    expect(tooltip).to_be_hidden()
+
+
 def copied(page: Page, label: str) -> str:
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     button = page.get_by_role("button", name=f"Copy as {label}")

@@ -7,7 +7,7 @@ import re
 import httpx
 from playwright.sync_api import Page, expect
 
-from tests.browser.eyes import difference, pixels, see_the_vehicles
+from tests.browser.eyes import difference, pixels, see_the_vehicles, settled
 from tests.browser.serving import Server, until
 
 #: A run that is at work for longer than the test.
@@ -24,7 +24,7 @@ def now(page: Page) -> float:
 
 def test_the_slider_moves_the_scene(opened: Page, keep):
     see_the_vehicles(opened, ["cekf"])
-    before = pixels(opened, "cekf")
+    before = settled(opened, "cekf")
     slider = opened.get_by_role("slider", name="Mission time")
     slider.focus()
     opened.keyboard.press("Home")

@@ -9,7 +9,7 @@ import httpx
 from playwright.sync_api import Browser, BrowserContext, Page, Route, expect
 
 from tests.browser.conftest import SIZE, SOLO, Watch
-from tests.browser.eyes import difference, pixels, see_the_vehicles
+from tests.browser.eyes import difference, pixels, see_the_vehicles, settled
 from tests.browser.serving import Server, until
 
 
@@ -128,14 +128,14 @@ def test_two_tabs_do_not_share_a_scene(context: BrowserContext, solo: str):
         scenes.append(set(page.locator("iframe").evaluate_all("all => all.map(f => f.src)")))
     assert len(scenes[0]) == len(scenes[1]) == 1
     assert not scenes[0] & scenes[1]
-    before = pixels(other, "cekf")
+    before = settled(other, "cekf")
     one.bring_to_front()
-    at_the_end = pixels(one, "cekf")
+    at_the_end = settled(one, "cekf")
     one.locator("#stage").focus()
     one.keyboard.press("Home")
     until(lambda: difference(at_the_end, pixels(one, "cekf")) > 0.005, "the first tab to move")
     other.bring_to_front()
-    assert difference(before, pixels(other, "cekf")) < 0.001
+    assert difference(before, settled(other, "cekf")) < 0.001
 
 
 def test_a_lost_server_is_told_and_found_again(browser: Browser, tmp_path: Path, keep):
