@@ -168,17 +168,27 @@ export function buildPlot(quantity, settings, changed) {
   canvas.addEventListener("lostpointercapture", release);
   canvas.addEventListener("dblclick", () => zoom.reset());
   canvas.addEventListener("pointerleave", () => hover.at(null));
-  new ResizeObserver(() => {
+  const size = new ResizeObserver(() => {
     if (drawing.data && canvas.clientWidth) window.Plotly.Plots.resize(drawing);
     point();
-  }).observe(canvas);
-  new IntersectionObserver(
+  });
+  const sight = new IntersectionObserver(
     ([entry]) => {
       visible = entry.isIntersecting;
       if (visible && stale) draw();
     },
     { root: part("stage"), rootMargin: "300px" },
-  ).observe(canvas);
+  );
+  size.observe(canvas);
+  sight.observe(canvas);
 
-  return { quantity, root, show, point };
+  /** Takes it off the page. What observes it, and plotly, would keep it. */
+  function close() {
+    size.disconnect();
+    sight.disconnect();
+    if (drawing.data) window.Plotly.purge(drawing);
+    root.remove();
+  }
+
+  return { quantity, root, show, point, close };
 }

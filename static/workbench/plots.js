@@ -63,13 +63,13 @@ export function mountPlots() {
     for (const button of choices.children) button.setAttribute("aria-pressed", String(drawn.includes(button.dataset.key)));
     for (const [key, plot] of plots) {
       if (drawn.includes(key)) continue;
-      plot.root.remove();
+      plot.close();
       plots.delete(key);
     }
     drawn.forEach((key, n) => {
       const quantity = quantities.find((q) => q.key === key);
       if (plots.get(key)?.quantity.title !== quantity.title) {
-        plots.get(key)?.root.remove();
+        plots.get(key)?.close();
         plots.set(key, buildPlot(quantity, settings, change));
       }
       const { root } = plots.get(key);
