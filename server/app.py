@@ -20,6 +20,7 @@ from server.jobs import Jobs
 from server.journal import Journal
 from server.logbook import Logbook
 from server.meter import Meter, Tally
+from server.scenes import inner
 from server.scenes.sessions import Sessions
 from server.settings import Settings
 from server.shelf import Shelf
@@ -31,6 +32,12 @@ MOST_THREADS = 8
 
 DESCRIPTION = """Compare cooperative underwater navigation estimators. Errors are problem+json
 (type, title, status, detail, and the key paths of input at fault)."""
+
+
+async def _prepare_panes(ready: asyncio.Event) -> None:
+    """Have what the first 3D pane needs, as soon as jobs can run."""
+    await ready.wait()
+    await asyncio.to_thread(inner.prepare)
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -48,7 +55,7 @@ def create_app(settings: Settings) -> FastAPI:
         scenes = Sessions(settings, work)
         shelf = Shelf(settings.data / "scenarios")
         app.state.site = Site(settings, journal, cluster, work, shelf, Logbook(settings, shelf), scenes, tally)
-        starting = asyncio.create_task(cluster.start(work.hear))
+        starting = asyncio.gather(cluster.start(work.hear), _prepare_panes(cluster.ready))
         work.start()
         try:
             yield

@@ -15,7 +15,7 @@ from distributed import Client, KilledWorker, LocalCluster
 from distributed.comm.core import CommClosedError
 from distributed.security import Security
 
-from server import work
+from server import nursery, work
 from server.settings import Settings
 from server.work import Answer, Piece
 
@@ -31,17 +31,16 @@ LOOK_S = 0.5
 #: A run that was stopped has this long to leave its worker; then the worker is started again.
 GRACE_S = 0.6
 STOP_POLL_S = 0.1
-#: Dask makes glibc give memory back at once, which costs arrays of many megabytes a third of their speed. A worker that
-#: reaches its memory limit is ended, not slowed down. What Dask remembers for its own dashboard, estimates told by our
-#: runs among it, fills memory; nobody looks at it here.
+#: A worker that reaches its memory limit is ended, not slowed down. What Dask remembers for its own dashboard,
+#: estimates told by our runs among it, fills memory; nobody looks at it here.
 PROCESSES = {
     "distributed.admin.log-length": 500,
     "distributed.admin.low-level-log-length": 50,
     "distributed.diagnostics.computations.max-history": 5,
     "distributed.diagnostics.erred-tasks.max-history": 5,
     "distributed.worker.profile.enabled": False,
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**26,
+    "distributed.nanny.pre-spawn-environ": nursery.ENVIRONMENT,
+    "distributed.worker.multiprocessing-method": nursery.METHOD,
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
@@ -61,6 +60,7 @@ async def _own_cluster(settings: Settings) -> LocalCluster:
 
     What they are sent is code to them: TLS with credentials of this run keeps other programs of the machine out.
     """
+    nursery.prepare()
     with dask.config.set(PROCESSES):
         return await LocalCluster(
             n_workers=settings.workers,

@@ -48,6 +48,8 @@ TIDY_S = 3600.0
 MOST_CHECKED = 2000
 #: A what-if job that takes more worker seconds stands in line like any other.
 WHAT_IF_S = 120.0
+#: Submissions that are worked on at once.
+MOST_ACCEPTING = 2
 #: Pause between attempts to record what a full disk did not take.
 AGAIN_S = 1.0
 
@@ -90,7 +92,9 @@ class Jobs:
         self.store, self.journal = store, journal
         self._cluster, self._settings = cluster, settings
         self._flow = Flow(cluster)
-        self._assembling = asyncio.Semaphore(1)
+        # Python's threads take turns with the event loop: few at work on jobs leave it time to answer.
+        self.accepting = asyncio.Semaphore(MOST_ACCEPTING)
+        self._planning, self._assembling = asyncio.Semaphore(1), asyncio.Semaphore(1)
         self._ended = asyncio.Event()
         self._checked: dict[Path, tuple[int, int, int]] = {}
         self._tidying: asyncio.Task[None] | None = None
@@ -340,8 +344,9 @@ class Jobs:
     async def _compute(self, job: Job) -> None:
         folder = self._folder / job.id
         await asyncio.to_thread(folder.mkdir, parents=True, exist_ok=True)
-        scenario, shards = await asyncio.to_thread(_planned, job)
-        await asyncio.to_thread(self._check_shards, job.id)
+        async with self._planning:
+            scenario, shards = await asyncio.to_thread(_planned, job)
+            await asyncio.to_thread(self._check_shards, job.id)
         finished = {*self.store.shards(job.id), *self.store.lost(job.id)}
         watch = self._running[job.id] = Watch(job, len(shards), finished, self.journal, folder / OUTLINE)
         watch.resume(self.store)

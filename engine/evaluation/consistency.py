@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from engine.tracks import Belief
 
@@ -28,7 +28,7 @@ EXACT_M = 1e-9
 @cache
 def interval(dof: int, count: int) -> tuple[float, float]:
     """95 % two-sided interval of the mean of `count` independent chi-square variables of `dof` each."""
-    low, high = chi2.ppf([0.025, 0.975], dof * count) / count
+    low, high = 2 * gammaincinv(dof * count / 2, [0.025, 0.975]) / count
     return float(low), float(high)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from engine.evaluation.consistency import sigma
 from engine.evaluation.spread import errors
@@ -52,7 +52,7 @@ def difference(value: np.ndarray, baseline: np.ndarray) -> Difference:
         return Difference(np.nan, np.nan)
     if n == 1:
         return Difference(float(apart[0]), np.nan)
-    half = student.ppf(0.5 + CONFIDENCE / 2, n - 1) * apart.std(ddof=1) / np.sqrt(n)
+    half = stdtrit(n - 1, 0.5 + CONFIDENCE / 2) * apart.std(ddof=1) / np.sqrt(n)
     return Difference(float(apart.mean()), float(half))
 
 

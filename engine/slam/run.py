@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.stats import binom, chi2
+from scipy.special import bdtrc, chdtrc
 
 from engine.registry import Progress
 from engine.slam.building import Plan, growths, name
@@ -102,7 +102,7 @@ def _doubts(ends: list[Moment]) -> list[str]:
         pose, said = doubtful[0]
         notes.append(f"{len(doubtful)} of {len(arrays)} arrays, such as the one from pose {pose}: {'; '.join(said)}")
     known = [end.misfit for end in ends if end.misfit is not None]
-    unlikely = [m for m in known if m.freedom > 0 and chi2.sf(m.squares, m.freedom) < UNLIKELY]
+    unlikely = [m for m in known if m.freedom > 0 and chdtrc(m.freedom, m.squares) < UNLIKELY]
     if unlikely:
         worst = max(unlikely, key=lambda m: m.squares / m.freedom)
         notes.append(
@@ -110,7 +110,7 @@ def _doubts(ends: list[Moment]) -> list[str]:
             f"{worst.squares:.0f} where about {worst.freedom} was expected; is a clock, the sound speed or a noise "
             "wrong?"
         )
-    refusing = [m for m in known if binom.sf(m.refused - 1, m.ranges, m.doubt) < UNLIKELY]
+    refusing = [m for m in known if bdtrc(m.refused - 1, m.ranges, m.doubt) < UNLIKELY]
     if refusing:
         worst = max(refusing, key=lambda m: m.refused / m.ranges)
         notes.append(

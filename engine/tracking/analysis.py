@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
+from engine.evaluation.consistency import interval
 from engine.tracking import recursion, simulate
 from engine.tracking.model import Model, make
 from engine.tracking.rules import RULES
@@ -78,11 +78,11 @@ def _central(model: Model, draws: simulate.Draws) -> dict[str, Any]:
 def _monte_carlo(errors: np.ndarray) -> dict[str, Any]:
     """Mean square of errors (trials, T) and the 95 % interval of the variance it estimates."""
     trials = errors.shape[0]
-    square = (errors**2).sum(axis=0)
-    low, high = square / chi2.ppf(0.975, trials), square / chi2.ppf(0.025, trials)
+    square = (errors**2).mean(axis=0)
+    low, high = interval(1, trials)
     return {
-        "monte_carlo": (square / trials).tolist(),
-        "monte_carlo_interval": np.stack([low, high], axis=-1).tolist(),
+        "monte_carlo": square.tolist(),
+        "monte_carlo_interval": np.stack([square / high, square / low], axis=-1).tolist(),
     }
 
 

@@ -54,19 +54,20 @@ async def submit(
     client = coopnav_client or (request.client.host if request.client else "")
     if idempotency_key is None:
         here.jobs.admit(client)
-    job = await here.jobs.submit(
-        Wanted(
-            scenario=await run_in_threadpool(_wanted, body, here),
-            name=body.scenario if isinstance(body.scenario, str) else None,
-            body=body.model_dump(mode="json"),
-            algorithms=body.algorithms,
-            key=idempotency_key,
-            client=client,
-            purpose=body.purpose,
-            limit_s=body.limit_s,
-            keep=body.keep,
+    async with here.jobs.accepting:
+        job = await here.jobs.submit(
+            Wanted(
+                scenario=await run_in_threadpool(_wanted, body, here),
+                name=body.scenario if isinstance(body.scenario, str) else None,
+                body=body.model_dump(mode="json"),
+                algorithms=body.algorithms,
+                key=idempotency_key,
+                client=client,
+                purpose=body.purpose,
+                limit_s=body.limit_s,
+                keep=body.keep,
+            )
         )
-    )
     response.headers["location"] = f"/api/jobs/{job.id}"
     return job.public()
 

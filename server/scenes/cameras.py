@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
-import viser
 
 from server.scenes.geometry import SPAN
 from server.scenes.pane import Pane
+
+if TYPE_CHECKING:
+    import viser
 
 OBLIQUE = np.concatenate([np.array([0.0, -0.9, 1.12]) * SPAN, np.zeros(3)])
 ABOVE = np.concatenate([np.array([0.0, -0.01, 1.45]) * SPAN, np.zeros(3)])

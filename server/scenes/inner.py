@@ -9,20 +9,30 @@ from __future__ import annotations
 import hmac
 import threading
 from collections.abc import Callable
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-import viser
 from websockets.asyncio import server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
+
+if TYPE_CHECKING:
+    import viser
 
 HEADER = "x-coopnav-pane"
 
 _starting = threading.Lock()
 
 
+def prepare() -> None:
+    """Import viser, which takes half as long as all else that a server imports: only the first pane waits for it."""
+    import_module("viser")
+
+
 def start(secret: str) -> viser.ViserServer:
     """A viser server on a free loopback port that refuses every request without the secret in its header."""
+    import viser  # see `prepare`
+
     serve, checked = server.serve, threading.Event()
 
     def guarded(*arguments: Any, **options: Any) -> Any:

@@ -123,12 +123,13 @@ class Rig:
         return time.monotonic() - start
 
     def workers(self) -> list[psutil.Process]:
-        """The processes that run shards: children of nannies."""
+        """The processes that run shards: of a server by itself copies of the one that has imported everything."""
         found = []
         for service in self.services:
             for process in service.family()[1:]:
                 with contextlib.suppress(psutil.NoSuchProcess):
-                    if "spawn_main" in " ".join(process.cmdline()):
+                    line, parent = " ".join(process.cmdline()), process.ppid()
+                    if "spawn_main" in line or ("forkserver" in line and parent != service.process.pid):
                         found.append(process)
         return found
 
