@@ -12,6 +12,7 @@ import anyio.to_thread
 from fastapi import FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 
+from engine import registry
 from server import problems, recovery
 from server.api import algorithms, docs, health, jobs, logs, marks, page, scenarios, scenes, tables, tracking
 from server.cluster import Cluster
@@ -34,9 +35,10 @@ DESCRIPTION = """Compare cooperative underwater navigation estimators. Errors ar
 (type, title, status, detail, and the key paths of input at fault)."""
 
 
-async def _prepare_panes(ready: asyncio.Event) -> None:
-    """Have what the first 3D pane needs, as soon as jobs can run."""
+async def _prepare(ready: asyncio.Event) -> None:
+    """Import what the first job and the first 3D pane need, as soon as jobs can run."""
     await ready.wait()
+    await asyncio.to_thread(registry.algorithms)
     await asyncio.to_thread(inner.prepare)
 
 
@@ -55,7 +57,7 @@ def create_app(settings: Settings) -> FastAPI:
         scenes = Sessions(settings, work)
         shelf = Shelf(settings.data / "scenarios")
         app.state.site = Site(settings, journal, cluster, work, shelf, Logbook(settings, shelf), scenes, tally)
-        starting = asyncio.gather(cluster.start(work.hear), _prepare_panes(cluster.ready))
+        starting = asyncio.gather(cluster.start(work.hear), _prepare(cluster.ready))
         work.start()
         try:
             yield

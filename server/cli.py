@@ -10,8 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from engine.scenario.errors import ScenarioError
-from server import commands
-from server.commands import Usage
+from server import nursery
 
 BAD_INPUT, INTERRUPTED = 2, 130
 
@@ -39,7 +38,7 @@ def parser() -> argparse.ArgumentParser:
         default="warning",
         help="what is logged; info has a line for every request",
     )
-    serve.set_defaults(run=commands.serve)
+    serve.set_defaults(run="serve")
 
     run = kinds.add_parser("run", help="run a scenario and compare its algorithms")
     _scenario(run)
@@ -52,7 +51,7 @@ def parser() -> argparse.ArgumentParser:
         "--statistics", action="store_true", help="keep no tracks, only figures over trials: up to a million of them"
     )
     run.add_argument("--workers", type=_count, metavar="N", help="processes to use (default: one per core)")
-    run.set_defaults(run=commands.run)
+    run.set_defaults(run="run")
 
     check = kinds.add_parser("check", help="check what the sources of scenarios claim")
     check.add_argument("scenarios", nargs="*", metavar="SCENARIO", help="shipped name, file or folder")
@@ -61,36 +60,40 @@ def parser() -> argparse.ArgumentParser:
         "--table-1", action="store_true", help="measure W11's Table I: five topologies and one with loss"
     )
     check.add_argument("--workers", type=_count, metavar="N", help="processes to use (default: one per core)")
-    check.set_defaults(run=commands.check)
+    check.set_defaults(run="check")
 
     log = kinds.add_parser("log", help="write what the sensors and modems of a mission saw as CSV files")
     _scenario(log)
     log.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write to")
-    log.set_defaults(run=commands.log)
+    log.set_defaults(run="log")
 
     listing = kinds.add_parser("list", help="list the algorithms or the shipped scenarios")
     listing.add_argument("what", choices=("algorithms", "scenarios"))
     listing.add_argument("--json", action="store_true", help="as JSON")
-    listing.set_defaults(run=commands.listing)
+    listing.set_defaults(run="listing")
 
     doctor = kinds.add_parser("doctor", help="check what the dashboard needs on this machine")
     _service(doctor)
-    doctor.set_defaults(run=commands.doctor)
+    doctor.set_defaults(run="doctor")
 
     report = kinds.add_parser("report", help="write a result as one HTML page")
     report.add_argument("source", metavar="JOB|DIR", help="a job of the server, or a folder that `run --out` wrote")
     report.add_argument("--out", type=Path, metavar="FILE.html", required=True, help="file to write")
     report.add_argument("--data", type=Path, metavar="DIR", help="where the server keeps its jobs")
-    report.set_defaults(run=commands.report)
+    report.set_defaults(run="report")
     return top
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 well, 1 a claim that fails, 2 bad input."""
     chosen = parser().parse_args(arguments)
+    if chosen.run == "serve" and chosen.cluster is None:
+        nursery.prepare()
+    from server import commands  # the engine with it, which --help need not wait for
+
     try:
-        return chosen.run(chosen)
-    except (Usage, ScenarioError) as error:
+        return getattr(commands, chosen.run)(chosen)
+    except (commands.Usage, ScenarioError) as error:
         print(f"coopnav: {error}", file=sys.stderr)
         return BAD_INPUT
     except BrokenPipeError:

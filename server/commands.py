@@ -17,7 +17,7 @@ from engine.evaluation.result import Result
 from engine.scenario import library, toml
 from engine.scenario.models import ScenarioBase
 from engine.scenario.navigation import NavigationScenario
-from server import nursery, table
+from server import table
 
 if TYPE_CHECKING:
     from server.settings import Settings
@@ -29,8 +29,6 @@ class Usage(Exception):
 
 def serve(chosen: Namespace) -> int:
     """Serve the dashboard until told to stop."""
-    if chosen.cluster is None:
-        nursery.prepare()  # while this process imports what it needs itself
     from server import serving
 
     try:

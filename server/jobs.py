@@ -138,7 +138,7 @@ class Jobs:
         too many jobs wait, 507 where the disk has no room.
         """
         scenario = wanted.scenario
-        names = runner.chosen(scenario, wanted.algorithms)
+        names = await asyncio.to_thread(runner.chosen, scenario, wanted.algorithms)
         digest = hashlib.sha256(json.dumps(wanted.body, sort_keys=True).encode()).hexdigest()
         known = await asyncio.to_thread(self.store.keyed, wanted.key) if wanted.key is not None else None
         if known is not None:

@@ -4,9 +4,9 @@ import logging
 from importlib import import_module
 
 from engine import registry
-from server import cli, work
+from server import commands, work
 
-__all__ = ["cli", "work"]
+__all__ = ["commands", "work"]
 
 import_module("engine.mission")
 registry.families()

@@ -12,7 +12,9 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection
 from starlette.responses import Response
+from uvicorn.protocols.utils import ClientDisconnected
 
 from engine.scenario.errors import ScenarioError
 from server.wire import dumps
@@ -105,6 +107,11 @@ def _of_http(error: HTTPException) -> Refusal:
     return Refusal(error.status_code, kind, str(error.detail), headers=dict(error.headers or {}))
 
 
+def _name(asked: HTTPConnection) -> str:
+    """A request, or a websocket, in the log."""
+    return f"{asked.scope.get('method', 'websocket')} {asked.url.path}"
+
+
 def install(app: FastAPI) -> None:
     """Answer every error of an app as a problem."""
 
@@ -124,20 +131,24 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, HTTPException)
         return response(_of_http(error))
 
-    async def stored(request: Request, error: Exception) -> Response:
+    async def gone(asked: HTTPConnection, _: Exception) -> None:
+        log.info("%s: the client went away", _name(asked))
+
+    async def stored(asked: HTTPConnection, error: Exception) -> Response:
         if not disk_full(error):
-            return await broken(request, error)
-        log.error("%s %s: %s", request.method, request.url.path, error)
+            return await broken(asked, error)
+        log.error("%s: %s", _name(asked), error)
         return response(Refusal(507, "storage", "the disk is full; delete jobs that are no longer needed"))
 
-    async def broken(request: Request, error: Exception) -> Response:
-        log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+    async def broken(asked: HTTPConnection, error: Exception) -> Response:
+        log.error("%s failed", _name(asked), exc_info=error)
         return response(Refusal(500, "internal", "the server failed to answer this; its log says why"))
 
     app.add_exception_handler(Refusal, refused)
     app.add_exception_handler(ScenarioError, bad_scenario)
     app.add_exception_handler(RequestValidationError, bad_request)
     app.add_exception_handler(HTTPException, bad_http)
-    app.add_exception_handler(sqlite3.OperationalError, stored)
-    app.add_exception_handler(OSError, stored)
-    app.add_exception_handler(Exception, broken)
+    app.add_exception_handler(ClientDisconnected, gone)  # pyright: ignore[reportArgumentType]
+    app.add_exception_handler(sqlite3.OperationalError, stored)  # pyright: ignore[reportArgumentType]
+    app.add_exception_handler(OSError, stored)  # pyright: ignore[reportArgumentType]
+    app.add_exception_handler(Exception, broken)  # pyright: ignore[reportArgumentType]

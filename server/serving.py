@@ -22,7 +22,7 @@ from server.settings import Settings
 TOKEN_VARIABLE = "COOPNAV_TOKEN"
 SHORTEST_TOKEN = 16
 #: A thread that computes hands over to the one that answers so soon, s.
-SWITCH_S = 0.001
+SWITCH_S = 0.0001
 #: Connections at once; more are answered 503.
 MOST_CONNECTIONS = 1000
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 import os
@@ -16,6 +17,7 @@ from typing import Any
 
 import httpx
 import pytest
+from uvicorn.protocols.utils import ClientDisconnected
 
 from server import logs, serving
 from server.cli import main
@@ -114,6 +116,28 @@ def test_log_lines_are_json_and_carry_the_job_and_the_request(live: Live, told: 
     assert any(line.get("job") == id and line["route"] == "/api/jobs/{id}" for line in requests)
     states = [line["message"] for line in lines if line["logger"] == "server.jobs" and line.get("job") == id]
     assert [message.rpartition(" ")[2] for message in states] == ["accepted", "running", "done"]
+
+
+def test_a_browser_that_goes_away_before_its_websocket_opens_is_no_error(live: Live, told: list[str]):
+    told.clear()
+    scope = {
+        "type": "websocket",
+        "path": "/api/scenes/session",
+        "headers": [(b"host", b"localhost")],
+        "query_string": b"",
+        "subprotocols": [],
+    }
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "websocket.connect"}
+
+    async def send(message: Any) -> None:
+        raise ClientDisconnected
+
+    asyncio.run(live.app(scope, receive, send))
+    lines = [json.loads(line) for line in told]
+    assert "websocket /api/scenes/session: the client went away" in [line["message"] for line in lines]
+    assert not [line for line in lines if line["level"] in ("error", "critical")]
 
 
 def test_text_lines_are_one_line_whatever_is_asked(live: Live):
