@@ -57,3 +57,18 @@ def tree(scopes: Iterable[Sequence[str]], order: Sequence[str]) -> BayesTree:
             cliques[parent].children.append(len(cliques))
             cliques.append(Clique([variable], separator, parent))
     return BayesTree(cliques, home)
+
+
+def untouched(tree: BayesTree, touched: Iterable[str]) -> list[str]:
+    """The variables whose conditionals stay when factors on `touched` are added, in an order that eliminates them alike.
+
+    A new factor changes the cliques of its variables and those that messages from there pass through (C19 Fig. 4-28).
+    """
+    changed, stay = {tree.home[v] for v in touched if v in tree.home}, []
+    for i in reversed(range(len(tree.cliques))):
+        clique = tree.cliques[i]
+        if i not in changed:
+            stay += clique.frontals
+        elif clique.parent is not None:
+            changed.add(clique.parent)
+    return stay

@@ -77,7 +77,7 @@ def _settle(graph: Graph, points: Points, draws: int, rng: np.random.Generator) 
     now = cost()
     for _ in range(STEPS):
         start = dict(points.values)
-        mean = down(graph, grown, propagation.up(graph, grown, points, nothing), points, nothing, 1, None)
+        mean = down(graph, grown, propagation.up(graph, grown, points, nothing), nothing, 1, None)
         for halving in range(HALVINGS):
             for v, value in start.items():
                 points.set(v, value + 0.5**halving * (mean[v] - value))
@@ -90,7 +90,7 @@ def _settle(graph: Graph, points: Points, draws: int, rng: np.random.Generator) 
         now = new
         if max(np.abs(points.values[v] - start[v]).max() for v in start) < SETTLED_M:
             break
-    return down(graph, grown, propagation.up(graph, grown, points, nothing), points, nothing, draws, rng)
+    return down(graph, grown, propagation.up(graph, grown, points, nothing), nothing, draws, rng)
 
 
 run = over_trials(solve)

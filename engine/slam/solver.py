@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.slam.bayes_tree import BayesTree, tree
+from engine.slam.bayes_tree import BayesTree, tree, untouched
 from engine.slam.elimination import order
 from engine.slam.factors.factor import Factor
 from engine.slam.factors.heard import Heard
@@ -104,7 +104,7 @@ class Solver:
             self.kernels = SCOUTS * wanted
             self._take(np.repeat(np.arange(wanted), SCOUTS))
         late, log_q = self._enter(kinds, added)
-        self._grow(order(list(self.graph.kinds), [f.variables for f in self.graph.factors], self._last(kinds)))
+        self._grow(kinds, added)
         before = self._known_evidence(late)
         self._settle()
         weights = self._evidence - before - log_q
@@ -127,14 +127,14 @@ class Solver:
         Of poses older than the lag they are those of when they were marginalized.
         """
         up = self._pass()
-        drawn = down(self.graph, self.tree, up, self._points, self._given, self.kernels, self._rng)
+        drawn = down(self.graph, self.tree, up, self._given, self.kernels, self._rng)
         found = self._past | drawn | {v: self._points.values[v] for v in self._given}
         return {v: found[v] for v in (variables if variables is not None else found)}
 
     def misfit(self) -> Misfit:
         """How badly the measurements fit the mode that each kernel leads to, by the median over kernels."""
         up = self._pass()
-        mean = down(self.graph, self.tree, up, self._points, self._given, self.kernels, None)
+        mean = down(self.graph, self.tree, up, self._given, self.kernels, None)
         at = mean | {v: self._points.values[v] for v in self._given}
         squares, rows, refused = np.zeros(self.kernels), np.zeros(self.kernels), np.zeros(self.kernels)
         doubts = []
@@ -155,13 +155,25 @@ class Solver:
             doubt=float(np.mean(doubts)) if doubts else 0.0,
         )
 
-    def _last(self, kinds: dict[str, Kind]) -> list[str]:
-        """What stays near the root: the newest pose, then the beacons."""
-        newest = [v for v in kinds or self.graph.kinds if v not in self._given][-1:]
-        return newest + [v for v in self.graph.kinds if v in self._given]
+    def _grow(self, kinds: dict[str, Kind], added: list[Factor]) -> None:
+        """The tree with these variables and factors, without another order where they do not reach.
 
-    def _grow(self, sequence: list[str]) -> None:
-        self.tree = tree([f.variables for f in self.graph.factors], sequence)
+        The newest pose and the beacons stay near the root, and poses that only linear factors tie lie at the leaves:
+        as beacons move, what is known of those is not asked again.
+        """
+        scopes = [f.variables for f in self.graph.factors]
+        newest = [v for v in kinds or self.graph.kinds if v not in self._given][-1:]
+        last = newest + [v for v in self.graph.kinds if v in self._given]
+        curved = {v for f in self.graph.factors if not f.linear for v in f.variables}
+        touched = {*last, *kinds, *(v for f in added for v in f.variables)}
+        sequence = order(
+            list(self.graph.kinds),
+            scopes,
+            last,
+            first=self.graph.kinds.keys() - curved,
+            kept=untouched(self.tree, touched),
+        )
+        self.tree = tree(scopes, sequence)
 
     # -- entering variables
 
@@ -211,7 +223,7 @@ class Solver:
         grown = tree([f.variables for f in self.graph.factors], sequence)
         try:
             up = Propagation().up(self.graph, grown, self._points, given)
-            return down(self.graph, grown, up, self._points, given, self.kernels, self._rng)
+            return down(self.graph, grown, up, given, self.kernels, self._rng)
         finally:
             self.graph.factors = everything
 
@@ -256,7 +268,7 @@ class Solver:
         curved = self._curved()
         for _ in range(SETTLINGS):
             up = self._pass()
-            mean = down(self.graph, self.tree, up, self._points, self._given, self.kernels, None)
+            mean = down(self.graph, self.tree, up, self._given, self.kernels, None)
             moved = False
             for v in curved:
                 if np.abs(mean[v] - self._points.values[v]).max() > SETTLED:
@@ -303,8 +315,8 @@ class Solver:
         self._given -= {v for v in self._given if v not in self.graph.kinds}
         for v in self._points.values.keys() - self.graph.kinds.keys():
             self._points.drop(v)
-        self._propagation = Propagation()
-        self._grow(order(list(self.graph.kinds), [f.variables for f in self.graph.factors], self._last({})))
+        self._propagation, self.tree = Propagation(), BayesTree([], {})
+        self._grow({}, [])
 
     # -- moves
 
