@@ -60,7 +60,7 @@ def tree(scopes: Iterable[Sequence[str]], order: Sequence[str]) -> BayesTree:
 
 
 def untouched(tree: BayesTree, touched: Iterable[str]) -> list[str]:
-    """The variables whose conditionals stay when factors on `touched` are added, in an order that eliminates them alike.
+    """The variables whose conditionals stay when factors on `touched` are added, in an order that leads to the same.
 
     A new factor changes the cliques of its variables and those that messages from there pass through (C19 Fig. 4-28).
     """

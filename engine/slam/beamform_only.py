@@ -25,7 +25,7 @@ def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
     densities: dict[str, list[Kde]] = {}
     beacons: dict[str, np.ndarray] = {}
     if not log.arrays:
-        yield Moment(log.poses - 1, poses[-1], {}, 1.0, poses)
+        yield Moment(log.poses - 1, poses[-1], poses.mean(1), {}, 1.0, poses)
     for n, a in enumerate(log.arrays, start=1):
         elements = np.swapaxes(poses[list(a.poses)], 0, 1)
         strata = rng.permutation((np.arange(N) + 0.5) / N)
@@ -34,8 +34,8 @@ def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
         end = n == len(log.arrays)
         last, cautions = (poses, log.cautions) if end else (None, {})
         told = {"array": told_array(a.array, elements.mean(0))} if trial == mission.trials[0] else {}
-        here, done = poses[a.poses[-1]][:, :2], n / len(log.arrays)
-        yield Moment(a.poses[-1], here, dict(beacons), done, last, cautions=cautions, told=told)
+        here, track, done = poses[a.poses[-1]][:, :2], poses[: a.poses[-1] + 1].mean(1), n / len(log.arrays)
+        yield Moment(a.poses[-1], here, track, dict(beacons), done, last, cautions=cautions, told=told)
 
 
 run = over_trials(solve)

@@ -53,7 +53,9 @@ def solve(log: SlamLog, mission: SlamMission, trial: int) -> Iterator[Moment]:
         draws = _settle(graph, points, options.kernels, rng)
         beacons = {b: draws[b] for b in mission.beacons if b in draws}
         poses = np.stack([draws[name(k)][:, :2] for k in range(log.poses)]) if done == total else None
-        yield Moment(growth.pose, draws[name(growth.pose)][:, :2], beacons, done / total if total else 1.0, poses)
+        track = np.stack([draws[name(k)][:, :2].mean(0) for k in range(growth.pose + 1)])
+        here, share = draws[name(growth.pose)][:, :2], done / total if total else 1.0
+        yield Moment(growth.pose, here, track, beacons, share, poses)
 
 
 def _unimodal(factor: Factor) -> Factor:

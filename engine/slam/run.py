@@ -15,10 +15,11 @@ from engine.slam.building import Plan, growths, name
 from engine.slam.densities import fit, from_gaussian
 from engine.slam.factors.synthetic_aperture import SyntheticAperture
 from engine.slam.log import SlamLog, thinned
+from engine.slam.misfit import Misfit
 from engine.slam.mission import SlamMission
 from engine.slam.reckoning import drifted
-from engine.slam.solver import Misfit, Solver
-from engine.slam.story import told_array, told_beliefs, told_factors, told_tree
+from engine.slam.solver import Solver
+from engine.slam.story import told_array, told_beliefs, told_errors, told_factors, told_tree
 from engine.tracks import Belief, Samples, Series, Tracks
 
 #: Chance below which a graph's residuals are said not to fit its model.
@@ -41,12 +42,14 @@ class Options(BaseModel):
 class Moment:
     """What is believed once a pose was reached: of that pose, `here`, and of the beacons heard, each (N, 2).
 
-    In the end there are all poses in `last` (P, N, 2), what speaks against the model, where the solver knows it, and
-    against each array, by its first pose. `told` is what of the story only the solver knows.
+    track (K, 2) are the means of all poses so far. In the end there are all poses in `last` (P, N, 2), what speaks
+    against the model, where the solver knows it, and against each array, by its first pose. `told` is what of the
+    story only the solver knows.
     """
 
     pose: int
     here: np.ndarray
+    track: np.ndarray
     beacons: dict[str, np.ndarray]
     done: float
     last: np.ndarray | None = None
@@ -74,6 +77,7 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
             done += growth.measurements
             beliefs = solver.beliefs()
             here, places = beliefs[name(growth.pose)][:, :2], {b: beliefs[b] for b in solver.beacons}
+            track = np.stack([beliefs[name(k)][:, :2].mean(0) for k in range(growth.pose + 1)])
             told: dict[str, Any] = {}
             if trial == mission.trials[0]:
                 told["tree"] = told_tree(step.tree, step.reused)
@@ -84,11 +88,11 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
                     at = np.stack([beliefs[v][:, :2].mean(0) for v in factor.variables[:-1]])
                     told["array"] = told_array(factor.array, at)
             if done < total:
-                yield Moment(growth.pose, here, places, done / total, told=told)
+                yield Moment(growth.pose, here, track, places, done / total, told=told)
                 continue
             poses = np.stack([beliefs[name(k)][:, :2] for k in range(log.poses)])
             cautions = log.cautions if plan.measurements == "arrays" else {}
-            yield Moment(growth.pose, here, places, 1.0, poses, solver.misfit(), cautions, told)
+            yield Moment(growth.pose, here, track, places, 1.0, poses, solver.misfit(), cautions, told)
 
     return over_trials(solve)
 
@@ -199,7 +203,10 @@ def _story(mission: SlamMission, moment: Moment) -> dict[str, Any]:
         "array": None,
         "factors": [],
     }
-    return when | told_beliefs(moment.beacons, moment.pose) | moment.told
+    beliefs = told_beliefs(moment.beacons, moment.pose)
+    truth = {name: place[0] for name, place in mission.truth.items()}
+    errors = told_errors(moment.track, truth.get(mission.vehicle), beliefs["beacons"], truth, moment.pose)
+    return when | beliefs | {"errors": errors} | moment.told
 
 
 def _curves(mission: SlamMission, beacon: str, points: np.ndarray, held: np.ndarray) -> dict[str, Series]:
@@ -216,7 +223,7 @@ def _curves(mission: SlamMission, beacon: str, points: np.ndarray, held: np.ndar
     if truth is None:
         return curves
     off = np.linalg.norm(modes[:, held] - truth, axis=-1)
-    curves[f"mode_error_m/{beacon}"] = Series("Error of the densest place", "m", off, (beacon,))
+    curves[f"mode_error_m/{beacon}"] = Series("Densest place's error", "m", off, (beacon,))
     return curves
 
 

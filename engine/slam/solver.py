@@ -18,21 +18,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from engine.slam.around import Around
 from engine.slam.bayes_tree import BayesTree, tree, untouched
 from engine.slam.elimination import order
 from engine.slam.factors.factor import Factor
-from engine.slam.factors.heard import Heard
 from engine.slam.factors.remembered import remembered
 from engine.slam.graph import Graph
+from engine.slam.misfit import Misfit, misfit
 from engine.slam.propagation import Points, Propagation, Up, down
 from engine.slam.variables import LABEL, Kind
 
-#: Candidates per kernel when a beacon is drawn anew, and the most factors that refine them.
-CANDIDATES, REFINERS = 16, 10
+#: The most factors that refine where a beacon is drawn anew.
+REFINERS = 10
 #: Sweeps for each that draws beacons anew; the others move them by differences between kernels.
 REDRAWS = 3
-#: Newton steps that refine candidates, and those that settle the poses for a proposed beacon.
-REFINEMENTS, SETTLINGS = 3, 2
+#: Newton steps that settle the poses for a proposed beacon.
+SETTLINGS = 2
 #: How many times more kernels first look for a new beacon, all around.
 SCOUTS = 8
 #: The spreads between which a kernel's step is drawn when it does not follow the others, m, and the share of those.
@@ -41,21 +42,6 @@ STEPS_M, OWN_STEPS = (0.02, 3.0), 0.3
 AT_ONCE = 16
 #: Distance (in each coordinate) below which a point of linearization is left where it is.
 SETTLED = 1e-3
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """What speaks against a model.
-
-    squares is the sum of squared residuals that should about equal freedom, the degrees of freedom; refused of ranges
-    were taken to be wrong altogether, which each is with the chance doubt.
-    """
-
-    squares: float
-    freedom: int
-    refused: int
-    ranges: int
-    doubt: float
 
 
 @dataclass(frozen=True)
@@ -132,28 +118,9 @@ class Solver:
         return {v: found[v] for v in (variables if variables is not None else found)}
 
     def misfit(self) -> Misfit:
-        """How badly the measurements fit the mode that each kernel leads to, by the median over kernels."""
-        up = self._pass()
-        mean = down(self.graph, self.tree, up, self._given, self.kernels, None)
-        at = mean | {v: self._points.values[v] for v in self._given}
-        squares, rows, refused = np.zeros(self.kernels), np.zeros(self.kernels), np.zeros(self.kernels)
-        doubts = []
-        for f in self.graph.factors:
-            e, J = f.linearize(*(at[v] for v in f.variables))
-            felt = np.any(np.stack(np.broadcast_arrays(*(np.abs(Jv).max(-1) > 0 for Jv in J))), axis=0)
-            squares += np.where(felt, np.square(e), 0.0).sum(-1)
-            rows += np.broadcast_to(felt, e.shape).sum(-1)
-            if isinstance(f, Heard):
-                refused += f.refused(*(at[v] for v in f.variables))
-                doubts.append(f.doubt)
-        free = sum(k.dim for k in self.graph.kinds.values() if k is not LABEL)
-        return Misfit(
-            squares=float(np.median(squares)),
-            freedom=round(float(np.median(rows))) - free,
-            refused=round(float(np.median(refused))),
-            ranges=len(doubts),
-            doubt=float(np.mean(doubts)) if doubts else 0.0,
-        )
+        """How badly the measurements fit the mode that each kernel leads to."""
+        mean = down(self.graph, self.tree, self._pass(), self._given, self.kernels, None)
+        return misfit(self.graph, mean | {v: self._points.values[v] for v in self._given}, self.kernels)
 
     def _grow(self, kinds: dict[str, Kind], added: list[Factor]) -> None:
         """The tree with these variables and factors, without another order where they do not reach.
@@ -375,77 +342,11 @@ class Solver:
             factors = [factors[i] for i in self._rng.choice(len(factors), REFINERS, replace=False)]
         seed = int(self._rng.integers(2**32))
 
-        def around() -> _Around:
-            return _Around(beacon, source, factors, self._points, self.kernels, np.random.default_rng(seed))
+        def around() -> Around:
+            return Around(beacon, source, factors, self._points, self.kernels, np.random.default_rng(seed))
 
         now = around()
         proposed = now.draw(self._rng)
         current = self._points.values[beacon]
         there = now.log_density(proposed)
         return self._try({beacon: proposed}, lambda: around().log_density(current) - there)
-
-
-class _Around:
-    """For each kernel a mixture of Gaussians over a beacon's place, about refined draws of one factor.
-
-    Its widths come from the factors' information there, bounded by the draws' own spacing; sources and noise are
-    the same whenever it is made with the same seed, so that it can be evaluated for the way back.
-    """
-
-    def __init__(
-        self,
-        beacon: str,
-        source: Factor,
-        factors: list[Factor],
-        points: Points,
-        kernels: int,
-        rng: np.random.Generator,
-    ) -> None:
-        M = CANDIDATES
-        strata = (np.arange(M) + rng.random((kernels, 1))) / M
-        others = {v: points.values[v][:, None] for f in (source, *factors) for v in f.variables if v != beacon}
-
-        def values(f: Factor, at: np.ndarray) -> list[np.ndarray]:
-            size = at.shape[:-1]
-            return [
-                at if v == beacon else np.broadcast_to(others[v], (*size, others[v].shape[-1])) for v in f.variables
-            ]
-
-        where = source.variables.index(beacon)
-        blank = np.zeros((kernels, M, points.values[beacon].shape[-1]))
-        at = source.sample(where, values(source, blank), strata, rng)
-        apart = np.sqrt(np.square(np.roll(at, 1, axis=1) - at).sum(-1)).mean(-1)[:, None, None, None]
-        slack = np.eye(at.shape[-1]) / np.square(np.maximum(apart, 1e-6))
-        log = np.zeros(at.shape[:-1])
-        P = np.broadcast_to(slack, (*at.shape, at.shape[-1]))
-        for step in range(REFINEMENTS + 1):
-            Lam, eta = np.zeros((*at.shape, at.shape[-1])), np.zeros(at.shape)
-            log = np.zeros(at.shape[:-1])
-            for f in factors:
-                e, J = f.linearize(*values(f, at))
-                Jb = J[f.variables.index(beacon)]
-                Lam = Lam + np.einsum("...ki,...kj->...ij", Jb, Jb)
-                eta = eta - np.einsum("...ki,...k->...i", Jb, e)
-                log = log - 0.5 * np.square(e).sum(-1)
-            P = Lam + slack
-            if step < REFINEMENTS:
-                at = at + np.linalg.solve(P, eta[..., None])[..., 0]
-        self._mean, self._P = at, P
-        self._log_det = 0.5 * np.linalg.slogdet(P)[1]
-        log = log - self._log_det
-        log = log - log.max(-1, keepdims=True)
-        # A little of every candidate: modes the poses of today speak against must stay within reach.
-        self._weight = 0.9 * np.exp(log) / np.exp(log).sum(-1, keepdims=True) + 0.1 / M
-
-    def draw(self, rng: np.random.Generator) -> np.ndarray:
-        N = len(self._mean)
-        chosen = (np.cumsum(self._weight, axis=1) < rng.random((N, 1))).sum(1).clip(0, self._weight.shape[1] - 1)
-        mean, P = self._mean[np.arange(N), chosen], self._P[np.arange(N), chosen]
-        half = np.linalg.inv(np.linalg.cholesky(P))
-        return mean + np.einsum("nij,ni->nj", half, rng.standard_normal(mean.shape))
-
-    def log_density(self, at: np.ndarray) -> np.ndarray:
-        d = at[:, None] - self._mean
-        z = -0.5 * np.einsum("nmi,nmij,nmj->nm", d, self._P, d) + self._log_det + np.log(self._weight)
-        top = z.max(-1, keepdims=True)
-        return top[:, 0] + np.log(np.exp(z - top).sum(-1))

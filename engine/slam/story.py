@@ -1,8 +1,9 @@
 """What SLAM tells of its first trial, for people to look into: beliefs, beams, records and the tree as they grew.
 
-All in JSON's own types and of bounded size: `moments` in order of time, each {time_s, beacons {name: {points_m,
-bandwidth_m, mode_m}}, divergence {name: nats}, pose, factors [[first pose, last pose, beacon, or null of a fix]] that
-were added, tree {parents, sizes, reused} or null, array {places_m, look_rad, beam, ranges_m, records} or null}.
+All in JSON's own types and of bounded size: `moments` in order of time, each {time_s, pose, beacons {name: {points_m,
+bandwidth_m, mean_m, mode_m}}, divergence {name: nats}, errors {poses_m, beacons {name: {mean_m, mode_m}}} where the
+truth is known, factors [[first pose, last pose, beacon, or null of a fix]] that were added, tree {parents, cliques,
+reused} or null, array {places_m, look_rad, beam, ranges_m, records} or null}.
 """
 
 from __future__ import annotations
@@ -31,10 +32,37 @@ def told_beliefs(beacons: dict[str, np.ndarray], seed: int) -> dict[str, Any]:
         told[name] = {
             "points_m": _rounded(kept, 2),
             "bandwidth_m": _rounded(kde.bandwidth, 4),
+            "mean_m": _rounded(points.mean(0), 2),
             "mode_m": _rounded(kde.mode, 2),
         }
         apart[name] = round(from_gaussian(kde, np.random.default_rng(seed)), 3)
     return {"beacons": told, "divergence": apart}
+
+
+def told_errors(
+    track: np.ndarray,
+    true_track: np.ndarray | None,
+    beacons: Mapping[str, Mapping[str, Any]],
+    truth: Mapping[str, np.ndarray],
+    pose: int,
+) -> dict[str, Any]:
+    """How far the poses (K, 2) are off on average (C19's e_p), and each beacon's mean and densest place (e_b), m.
+
+    beacons as told_beliefs tells of them at a pose of this number; truth {name: (P, 2)}. None where it has no number.
+    """
+
+    def off(place: Any, true: np.ndarray) -> float | None:
+        away = float(np.linalg.norm(np.asarray(place) - true, axis=-1).mean())
+        return round(away, 3) if np.isfinite(away) else None
+
+    return {
+        "poses_m": None if true_track is None else off(track, true_track[: len(track)]),
+        "beacons": {
+            name: {key: off(told[key], truth[name][pose]) for key in ("mean_m", "mode_m")}
+            for name, told in beacons.items()
+            if name in truth
+        },
+    }
 
 
 def told_factors(factors: Iterable[Factor], pose_of: Mapping[str, int], beacons: Container[str]) -> list[list[Any]]:
@@ -49,12 +77,15 @@ def told_factors(factors: Iterable[Factor], pose_of: Mapping[str, int], beacons:
 
 
 def told_tree(tree: BayesTree, reused: frozenset[int]) -> dict[str, Any] | None:
-    """Parents (-1 for a root) and sizes of the cliques, and which were not done again; None for a very large tree."""
+    """Each clique's parent (-1 for a root), its variables as "frontals | separator", and whether it was not done again.
+
+    The separator is what its message to the parent is about. None for a very large tree.
+    """
     if len(tree.cliques) > CLIQUES:
         return None
     return {
         "parents": [-1 if c.parent is None else c.parent for c in tree.cliques],
-        "sizes": [len(c.variables) for c in tree.cliques],
+        "cliques": [f"{' '.join(c.frontals)} | {' '.join(c.separator)}".rstrip(" |") for c in tree.cliques],
         "reused": [int(i in reused) for i in range(len(tree.cliques))],
     }
 

@@ -28,6 +28,10 @@ class Track:
                 mine[subject] = np.concatenate([mine.get(subject, np.zeros((0, width))), numbers(rows, width)])
 
 
+#: A belief this near a true track is always shown, m.
+LEAST_REACH_M = 100.0
+
+
 @dataclass(frozen=True)
 class Packet:
     """A broadcast on its way from one subject to another, both by number."""
@@ -63,9 +67,23 @@ class Footage:
         return max((float(t.time_s[-1]) for t in self.tracks.values() if len(t.time_s)), default=0.0)
 
     def points(self) -> np.ndarray:
-        """All positions there are (N, 2) m, for the extent."""
-        parts = list(self.truth.values()) + [m for t in self.tracks.values() for m in t.mean.values()]
-        return np.concatenate([np.zeros((0, 2)), *parts, *(sound.points() for sound in self.sounds.values())])
+        """Positions (N, 2) m, for the extent.
+
+        What is believed farther from the true tracks than those are wide is left out: one wild estimate would leave
+        all others no room.
+        """
+        true = np.concatenate([np.zeros((0, 2)), *self.truth.values()])
+        known = true[np.isfinite(true).all(axis=-1)]
+        believed = [m for t in self.tracks.values() for m in t.mean.values()]
+        clouds = [cloud for sound in self.sounds.values() for cloud in sound.clouds()]
+        if len(known):
+            low, high = known.min(axis=0), known.max(axis=0)
+            reach = max(float((high - low).max()), LEAST_REACH_M)
+            believed = [m[((m >= low - reach) & (m <= high + reach)).all(axis=-1)] for m in believed]
+            middles = [np.median(cloud, axis=0) for cloud in clouds]
+            near = [bool(((m >= low - reach) & (m <= high + reach)).all()) for m in middles]
+            clouds = [cloud for cloud, stays in zip(clouds, near, strict=True) if stays]
+        return np.concatenate([known, *believed, *clouds])
 
 
 def footage(view: dict[str, Any], algorithms: list[str]) -> Footage:

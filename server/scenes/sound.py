@@ -41,10 +41,10 @@ class Sound:
         told = self.moments[last]["beacons"] if last >= 0 else {}
         return {name: np.array(belief["mode_m"], float) for name, belief in told.items()}
 
-    def points(self) -> np.ndarray:
-        """All places (N, 2) m that were believed in."""
+    def clouds(self) -> list[np.ndarray]:
+        """Places (N, 2) m that were believed in, of each moment and beacon, and the drifted track."""
         told = [belief["points_m"] for moment in self.moments for belief in moment["beacons"].values()]
-        return np.concatenate([self.drifted, *(np.array(points, float) for points in told)])
+        return [cloud for cloud in (self.drifted, *(np.array(points, float) for points in told)) if len(cloud)]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,9 @@ const ROW = 14;
 const SIDE = 150;
 const GRAPH = { width: 380, height: 112, margin: 12 };
 const TREE = { width: 380, height: 150, margin: 8 };
+const GROWTH = { width: 380, left: 30, right: 8, top: 16, errors: 78, between: 20, divergence: 40 };
+/** What is shown of each measurement's errors: the field, and its name beside the line. */
+const ERRORS = { mean: "beacon, mean", mode: "beacon, densest place", poses: "poses, average" };
 
 /** Filter output of an array's records, one row each: range to the right, loudness as ink. */
 export function waterfall(array) {
@@ -51,7 +54,7 @@ export function polar(array) {
 }
 
 /** The tree, a clique a bar as wide as its subtree, roots on top: filled where it was computed anew. */
-export function icicle({ parents, sizes, reused }) {
+export function icicle({ parents, cliques, reused }) {
   const children = parents.map(() => []);
   const roots = [];
   parents.forEach((parent, n) => (parent < 0 ? roots : children[parent]).push(n));
@@ -66,7 +69,9 @@ export function icicle({ parents, sizes, reused }) {
   const drawn = [];
   const place = (n, x) => {
     const bar = svg("rect", { x: TREE.margin + x * scale, y: TREE.margin + depth[n] * row, width: Math.max(0.5, weight[n] * scale - 0.4), height: Math.max(0.6, row - 0.4), class: reused[n] ? "kept" : "anew" });
-    bar.append(svg("title", {}, `clique of ${sizes[n]} variables, ${reused[n] ? "reused" : "computed anew"}`));
+    const [frontals, separator] = cliques[n].split(" | ");
+    const message = separator ? `; its message to the clique above is about ${separator}` : "";
+    bar.append(svg("title", {}, `${frontals}: ${reused[n] ? "reused" : "computed anew"}${message}`));
     drawn.push(bar);
     let from = x;
     for (const child of children[n]) {
@@ -113,4 +118,53 @@ export function graph(moments, n) {
   }
   const label = `Factor graph: ${poses} poses, ${measured} measurements, ${fixes} fixes`;
   return svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", "aria-label": label, class: "factors" }, ...drawn);
+}
+
+/** Errors of beacons and poses (m), and the divergence from a Gaussian (nats), against the factors so far; n is marked. */
+export function growth(moments, n) {
+  const { width, left, right, top, errors, between, divergence } = GROWTH;
+  const height = top + errors + between + divergence + 18;
+  let factors = 0;
+  const told = moments.some((m) => m.factors.length);
+  const counts = moments.map((m) => (factors += told ? m.factors.filter((f) => f[2] !== null).length : 1));
+  const x = (k) => left + ((width - left - right) * (counts[k] - counts[0])) / Math.max(1, factors - counts[0]);
+  const beacons = [...new Set(moments.flatMap((m) => Object.keys(m.divergence)))];
+  const lines = { mean: [], mode: [], poses: [moments.map((m) => m.errors.poses_m)] };
+  for (const beacon of beacons) {
+    lines.mean.push(moments.map((m) => m.errors.beacons[beacon]?.mean_m ?? null));
+    lines.mode.push(moments.map((m) => m.errors.beacons[beacon]?.mode_m ?? null));
+  }
+  const nats = beacons.map((beacon) => moments.map((m) => m.divergence[beacon] ?? null));
+  const drawn = [];
+  const panel = (from, high, rows, unit) => {
+    const known = rows.flatMap((row) => row.values).filter((v) => v !== null);
+    if (!known.length) return;
+    const decade = (v) => Math.log10(Math.max(v, 0.01));
+    const low = Math.floor(Math.min(...known.map(decade)));
+    const most = Math.max(low + 1, Math.ceil(Math.max(...known.map(decade))));
+    const y = (v) => from + high * (1 - (decade(v) - low) / (most - low));
+    for (let power = low; power <= most; power += 1) {
+      drawn.push(svg("line", { x1: left, x2: width - right, y1: y(10 ** power), y2: y(10 ** power), class: "grid" }));
+      drawn.push(svg("text", { x: left - 4, y: y(10 ** power) + 3.5, class: "tick" }, power === most ? `${10 ** power} ${unit}` : String(10 ** power)));
+    }
+    for (const { name, values } of rows) {
+      const points = values.flatMap((v, k) => (v === null ? [] : [`${x(k).toFixed(1)},${y(v).toFixed(1)}`])).join(" ");
+      drawn.push(svg("polyline", { points, class: name }));
+      if (values[n] !== null) drawn.push(svg("circle", { cx: x(n), cy: y(values[n]), r: 2.5, class: name }));
+    }
+  };
+  panel(top, errors, Object.entries(lines).flatMap(([name, all]) => all.map((values) => ({ name, values }))), "m");
+  panel(top + errors + between, divergence, nats.map((values) => ({ name: "nats", values })), "nats");
+  drawn.push(svg("line", { x1: x(n), x2: x(n), y1: top, y2: height - 18, class: "now" }));
+  let at = left;
+  for (const [name, words] of Object.entries(ERRORS)) {
+    drawn.push(svg("line", { x1: at, x2: at + 16, y1: 7, y2: 7, class: name }), svg("text", { x: at + 20, y: 10.5 }, words));
+    at += 32 + 5.6 * words.length;
+  }
+  drawn.push(svg("text", { x: left, y: top + errors + between - 6 }, "divergence from a Gaussian"));
+  drawn.push(svg("text", { x: width - right, y: height - 4, class: "tick" }, `${counts[0]} to ${factors} measurements`));
+  const e = moments[n].errors;
+  const off = [...beacons.map((b) => [b, e.beacons[b]?.mode_m]), ["poses", e.poses_m]].filter(([, v]) => v !== null && v !== undefined);
+  const label = `Errors after ${counts[n]} of ${factors} measurements: ${off.map(([what, v]) => `${what} ${v.toFixed(2)} m`).join(", ") || "no truth is known"}`;
+  return svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", "aria-label": label, class: "growth" }, ...drawn);
 }

@@ -5,7 +5,7 @@ import { number, plural } from "../look/format.js";
 import { lineSample } from "../look/swatch.js";
 import { clock } from "../state/clock.js";
 import { store } from "../state/store.js";
-import { graph, icicle, polar, waterfall } from "./figures.js";
+import { graph, growth, icicle, polar, waterfall } from "./figures.js";
 import { listeners, momentAt, momentsOf } from "./story.js";
 
 export function mountListening() {
@@ -53,7 +53,7 @@ export function mountListening() {
       figures.replaceChildren();
       return;
     }
-    const { tree, array, divergence, factors } = moments[n];
+    const { tree, array, divergence, factors, errors } = moments[n];
     const modes = Object.entries(divergence).map(([beacon, nats]) => `${beacon} ${number(nats, 2)} nats from a Gaussian`);
     const work = tree ? `${plural(tree.parents.length, "clique")}, ${tree.reused.reduce((sum, x) => sum + x, 0)} of them reused` : "";
     say(words, [`Measurement ${n + 1} of ${moments.length}`, ...modes, work].filter(Boolean).join(" · "));
@@ -61,7 +61,8 @@ export function mountListening() {
     figures.replaceChildren(
       ...(array ? [figure("Matched filter, record by record", waterfall(array)), figure("Beam", polar(array))] : []),
       ...(factors.length ? [figure("Factor graph: new factors dark, fixes square", graph(moments, n))] : []),
-      ...(tree ? [figure("Bayes tree: computed anew dark, reused pale", icicle(tree))] : []),
+      ...(tree?.cliques ? [figure("Bayes tree: messages go up; computed anew dark, reused pale", icicle(tree))] : []),
+      ...(errors && Object.keys(divergence).length ? [figure("Errors and divergence against measurements", growth(moments, n))] : []),
     );
   }
 

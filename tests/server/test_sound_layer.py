@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from engine.registry import algorithm, silent
 from engine.slam.mission import fly
 from server.scenes import palette, sound
+from server.scenes.footage import Footage, Track
 from server.scenes.geometry import chart
 from tests.engine.slam.missions import scenario
 
@@ -87,7 +89,7 @@ def test_the_densest_place_is_one_of_those_believed_in(told):
     found = sound.read(told[2])
     assert found.modes(-1.0) == {}
     mode = found.modes(float(found.time_s[-1]))["beacon"]
-    assert np.linalg.norm(found.points() - mode, axis=1).min() < 1.0
+    assert np.linalg.norm(np.concatenate(found.clouds()) - mode, axis=1).min() < 1.0
 
 
 def test_arrays_before_stay_faint(told):
@@ -102,7 +104,40 @@ def test_the_story_names_what_was_added_and_reused(told):
     assert [f for f in last["factors"] if f[2]] == [[38, 45, "beacon"]]
     assert [0, 0, None] in first["factors"] and [45, 45, None] in last["factors"]
     assert not any(first["tree"]["reused"])
-    assert len(last["tree"]["parents"]) == len(last["tree"]["sizes"]) == len(last["tree"]["reused"])
+    tree = last["tree"]
+    assert len(tree["parents"]) == len(tree["cliques"]) == len(tree["reused"])
+    for clique, parent in zip(tree["cliques"], tree["parents"]):
+        message = clique.partition(" | ")[2].split()
+        assert (parent < 0) == (not message)
+        assert set(message) <= set(tree["cliques"][parent].replace("|", "").split())
+
+
+def test_the_story_tells_errors_against_the_truth(told):
+    """Of beacons by mean and densest place, of the poses until then on average; the last as the tracks have it."""
+    mission, tracks, story = told
+    errors = [m["errors"] for m in story["moments"]]
+    belief, track = tracks.beliefs["beacon"], tracks.beliefs["auv"]
+    off = np.linalg.norm(belief.mean[0, -1] - mission.truth["beacon"][0, -1])
+    assert errors[-1]["beacons"]["beacon"]["mean_m"] == pytest.approx(off, abs=0.02)
+    mode = tracks.series["mode_error_m/beacon"].value[0, -1]
+    assert errors[-1]["beacons"]["beacon"]["mode_m"] == pytest.approx(mode, abs=0.02)
+    poses = np.linalg.norm(track.mean[0] - mission.truth["auv"][0], axis=-1).mean()
+    assert errors[-1]["poses_m"] == pytest.approx(poses, abs=0.02)
+    assert errors[0]["beacons"]["beacon"]["mean_m"] > 20.0, "between two mirror images"
+
+
+def test_a_wild_belief_does_not_shrink_the_scene(told):
+    mission, tracks, story = told
+    found = sound.read(story)
+    cloud = {"points_m": [[4000.0, 0.0]] * 4, "bandwidth_m": [1.0, 1.0], "mode_m": [4000.0, 0.0]}
+    wild = dataclasses.replace(found, moments=[{**found.moments[0], "beacons": {"beacon": cloud}}, *found.moments[1:]])
+    truth = {name: place[0] for name, place in mission.truth.items()}
+    mean = {"beacon": np.array([[0.0, 0.0], [-3000.0, 0.0], [np.nan, 0.0]])}
+    tracks = {"sas_static": Track(mean=mean)}
+    points = Footage(mission.time_s, [], truth, [], tracks, sounds={"sas_static": wild}).points()
+    assert np.isfinite(points).all() and np.abs(points).max() < 300.0
+    mirrored = Footage(mission.time_s, [], truth, [], {}, sounds={"sas_static": found}).points()
+    assert np.linalg.norm(mirrored - [3.0, -78.0], axis=1).min() < 6.0, "the mirror image is shown"
 
 
 @pytest.mark.parametrize("name", ["sas_dynamic", "range_only"])

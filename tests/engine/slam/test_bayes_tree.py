@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.slam.bayes_tree import BayesTree, tree
+from engine.slam.bayes_tree import BayesTree, tree, untouched
 from engine.slam.elimination import order, separators
 
 #: Fig. 4-19: [X2][Z1|X1,X2][Z2|X1,L1][Z3|X2,L1][Z4|L1,L2][Z5|L2,X3].
@@ -70,6 +70,7 @@ def test_a_new_variable_leaves_the_sibling_clique_of_figure_4_28_as_it_was():
     kept = (frozenset({"x1", "x2"}), ("l1",))
     assert kept in shape(before) and kept in shape(grown)
     assert (frozenset({"x3"}), ("l2",)) not in shape(grown)
+    assert untouched(before, ["x3", "l2"]) == ["x1", "x2"] or untouched(before, ["x3", "l2"]) == ["x2", "x1"]
 
 
 @settings(max_examples=60, deadline=None)
@@ -88,6 +89,44 @@ def test_every_factor_fits_a_clique_and_separators_lie_in_their_parents(size: in
     for clique in found.cliques:
         if clique.parent is not None:
             assert set(clique.separator) <= set(found.cliques[clique.parent].variables)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(4, 30), st.integers(0, 15), st.integers(0, 10_000))
+def test_a_tree_that_grows_keeps_the_cliques_that_no_new_factor_reaches(size: int, more: int, seed: int):
+    """Whatever the graph: cliques of untouched variables are the same afterwards, and the order is still one of all."""
+    rng = np.random.default_rng(seed)
+    names = [f"v{i}" for i in range(size)]
+    scopes = list(pairwise(names))
+    scopes += [tuple(rng.choice(names, 2, replace=False)) for _ in range(more)]
+    before = tree(scopes, order(names, scopes, last=names[-1:]))
+    touched = [names[-1], "new", *rng.choice(names, 2)]
+    kept = untouched(before, touched)
+    assert not set(kept) & set(touched)
+    grown = [*scopes, (names[-1], "new"), tuple(touched[-2:])]
+    sequence = order([*names, "new"], grown, ["new"], first=names[: size // 2], kept=kept)
+    assert sorted(sequence) == sorted([*names, "new"]) and sequence[: len(kept)] == kept
+    after = tree(grown, sequence)
+    net_before, net_after = dict(separators(scopes, _sequence(before))), dict(separators(grown, sequence))
+    for v in kept:
+        assert set(net_before[v]) == set(net_after[v])
+    for scope in grown:
+        assert any(set(scope) <= set(c.variables) for c in after.cliques)
+
+
+def _sequence(found: BayesTree) -> list[str]:
+    """An order that leads to a tree."""
+    return [v for clique in reversed(found.cliques) for v in clique.frontals]
+
+
+def test_what_comes_first_lies_below_the_rest():
+    """A chain of which every tenth pose was heard: no pose between two of those is above any of them."""
+    names = [f"x{i}" for i in range(100)]
+    scopes, heard = list(pairwise(names)), set(names[::10])
+    sequence = order(names, scopes, names[-1:], first=set(names) - heard)
+    net = dict(separators(scopes, sequence))
+    assert all(set(net[v]) <= heard | {names[-1]} for v in heard)
+    assert max(map(len, net.values())) <= 2
 
 
 def test_a_chain_is_ordered_without_fill():

@@ -51,6 +51,25 @@ def test_random_graphs_with_loops_have_the_exact_moments():
             np.testing.assert_allclose(np.cov(drawn[name].T), cov, atol=0.2 * np.trace(cov))
 
 
+@pytest.mark.parametrize("kernels", [100, 500])
+def test_random_graphs_keep_their_variances_with_few_kernels(kernels: int):
+    """Fifty graphs, half of them with loops, twenty seeds each: variances over the exact ones, averaged over seeds."""
+    rng = np.random.default_rng(6)
+    ratios = []
+    for number in range(50):
+        graph = chain(int(rng.integers(3, 9)), rng, closures=int(rng.integers(1, 5)) if number % 2 else 0)
+        means, covs = exact(graph)
+        drawn = [solved(graph, kernels, seed) for seed in range(20)]
+        for name, cov in covs.items():
+            found = np.mean([np.diag(np.cov(d[name].T)) for d in drawn], axis=0)
+            ratios += list(found / np.diag(cov))
+            error = np.mean([d[name].mean(0) for d in drawn], axis=0) - means[name]
+            assert (np.abs(error) < 5.5 * np.sqrt(np.diag(cov) / (20 * kernels))).all()
+    # Of independent draws each ratio has a standard deviation of sqrt(2 / (20 kernels)): 0.014 of 500, 0.032 of 100.
+    assert np.abs(np.array(ratios) - 1).max() < 0.2
+    assert np.std(ratios) < 1.3 * np.sqrt(2 / (20 * kernels)) and abs(np.mean(ratios) - 1) < 0.02
+
+
 def test_what_is_added_later_counts_as_if_it_had_been_there():
     graph = chain(12, np.random.default_rng(4), closures=3)
     means, covs = exact(graph)
@@ -113,6 +132,43 @@ def test_a_bimodal_chain_has_the_grids_answer(together: bool):
     for name, mass in expected.items():
         found = np.histogram(solver.beliefs([name])[name][:, 0], edges)[0] / 2000
         true = np.histogram(x, edges, weights=mass)[0]
+        assert 0.5 * np.abs(found - true).sum() < 0.1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_bimodal_loops_have_the_grids_answer(seed: int):
+    """Three numbers, tied all to all; one or two have a prior of two modes. Against sums over a grid of 141^3."""
+    rng = np.random.default_rng(seed)
+    names = ["a", "b", "c"]
+    x = np.linspace(-7, 7, 141)
+    grids = dict(zip(names, np.meshgrid(x, x, x, indexing="ij"), strict=True))
+    log = np.zeros((141, 141, 141))
+    kinds: dict[str, Kind] = dict.fromkeys(names, REAL)
+    factors: list = []
+    for v in names[: 1 + seed % 2]:
+        weight, sigmas = rng.uniform(0.3, 0.7), rng.uniform(0.3, 0.9, 2)
+        means = np.array([-2.0, 2.0]) + rng.normal(scale=0.4, size=2)
+        shares = [weight, 1 - weight]
+        parts = [prior(v, REAL, [m], [[s**2]]) for m, s in zip(means, sigmas, strict=True)]
+        said = [(p, -np.log(s), f) for p, s, f in zip(shares, sigmas, parts, strict=True)]
+        kinds[f"which_{v}"] = LABEL
+        factors.append(mixture(f"which_{v}", said))
+        density = [
+            p / s * np.exp(-0.5 * ((grids[v] - m) / s) ** 2) for p, s, m in zip(shares, sigmas, means, strict=True)
+        ]
+        log += np.log(sum(density))
+    for one, other in (("a", "b"), ("b", "c"), ("a", "c")):
+        step, sigma = rng.normal(scale=0.5), rng.uniform(0.5, 1.5)
+        factors.append(displacement(one, other, REAL, [step], [[sigma**2]]))
+        log += -0.5 * ((grids[other] - grids[one] - step) / sigma) ** 2
+    mass = np.exp(log - log.max())
+    mass /= mass.sum()
+    solver = Solver(2000, seed, sweeps=8)
+    solver.extend(kinds, factors)
+    edges = np.linspace(-7, 7, 29)
+    for axis, name in enumerate(names):
+        true = np.histogram(x, edges, weights=mass.sum(tuple({0, 1, 2} - {axis})))[0]
+        found = np.histogram(solver.beliefs([name])[name][:, 0], edges)[0] / 2000
         assert 0.5 * np.abs(found - true).sum() < 0.1
 
 
@@ -259,3 +315,35 @@ def test_what_an_extension_does_not_touch_is_not_done_again():
     home = grown.tree.home
     assert {home[f"x{k}"] for k in range(10)} <= grown.reused
     assert home["x30"] not in grown.reused
+
+
+def test_odometry_is_not_asked_again_as_the_poses_around_it_move():
+    """Between two poses that were ranged from the chain is one message, wherever those move; it counts as ever."""
+    rng = np.random.default_rng(8)
+    beacon, cov = np.array([20.0, 30.0]), 0.05 * np.eye(2)
+    solver = Solver(60, seed=2)
+    at = np.zeros(2)
+    solver.extend(
+        {"x0": POINT2, "l": POINT2},
+        [prior("x0", POINT2, at, 0.01 * np.eye(2)), ranging("x0", "l", float(np.linalg.norm(beacon)), 0.3)],
+    )
+    reached = 0
+    for leg in (np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.array([-1.0, 0.5])):
+        steps = leg + 0.2 * rng.standard_normal((20, 2))
+        names = [f"x{reached + k}" for k in range(21)]
+        factors: list = [displacement(a, b, POINT2, s, cov) for a, b, s in zip(names, names[1:], steps, strict=False)]
+        at, reached = at + 20 * leg, reached + 20
+        factors.append(ranging(names[-1], "l", float(np.linalg.norm(at - beacon)), 0.3))
+        made = solver._propagation.made
+        grown = solver.extend(dict.fromkeys(names[1:], POINT2), factors)
+    for first in (1, 21):
+        # All but what shares its clique with a pose that heard the beacon.
+        again = [k for k in range(first, first + 19) if grown.tree.home[f"x{k}"] not in grown.reused]
+        assert len(again) <= 2, f"poses {again} were done again"
+    # Twenty new cliques of odometry, and in each of at most 30 passes those of the four poses that heard the beacon.
+    assert solver._propagation.made - made < 20 + 4 * 30
+    whole = Solver(60, seed=3)
+    whole.extend(solver.graph.kinds, solver.graph.factors)
+    for v in ("l", "x30", "x60"):
+        ours, anew = solver.beliefs([v])[v], whole.beliefs([v])[v]
+        assert np.linalg.norm(ours.mean(0) - anew.mean(0)) < 5 * np.sqrt(2 / 60) * np.hypot(*anew.std(0)) + 0.05
