@@ -7,7 +7,7 @@ const ROW = 14;
 const SIDE = 150;
 const GRAPH = { width: 380, height: 112, margin: 12 };
 const TREE = { width: 380, height: 150, margin: 8 };
-const GROWTH = { width: 380, left: 30, right: 8, top: 16, errors: 78, between: 20, divergence: 40 };
+const GROWTH = { width: 380, left: 44, right: 8, top: 16, errors: 78, between: 20, divergence: 40 };
 /** What is shown of each measurement's errors: the field, and its name beside the line. */
 const ERRORS = { mean: "beacon, mean", mode: "beacon, densest place", poses: "poses, average" };
 
@@ -145,7 +145,7 @@ export function growth(moments, n) {
     const y = (v) => from + high * (1 - (decade(v) - low) / (most - low));
     for (let power = low; power <= most; power += 1) {
       drawn.push(svg("line", { x1: left, x2: width - right, y1: y(10 ** power), y2: y(10 ** power), class: "grid" }));
-      drawn.push(svg("text", { x: left - 4, y: y(10 ** power) + 3.5, class: "tick" }, power === most ? `${10 ** power} ${unit}` : String(10 ** power)));
+      if (power === low || power === most) drawn.push(svg("text", { x: left - 4, y: y(10 ** power) + 3.5, class: "tick" }, `${10 ** power} ${unit}`));
     }
     for (const { name, values } of rows) {
       const points = values.flatMap((v, k) => (v === null ? [] : [`${x(k).toFixed(1)},${y(v).toFixed(1)}`])).join(" ");
