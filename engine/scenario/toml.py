@@ -21,9 +21,11 @@ MAX_BYTES = 4_000_000
 #: Parts of a dotted key; the time to read one grows with their cube.
 MAX_PARTS = 32
 
-#: What dots in a TOML text mean nothing in: strings and comments.
+#: What dots in a TOML text mean nothing in: strings and comments. A string without an end goes on to where one would
+#: have to be, so that nothing is read twice.
 _QUIET = re.compile(
-    r'"""(?:[^\\]|\\.)*?"""|' + r"'''.*?'''|" + r'"(?:[^"\\\n]|\\.)*+"|' + r"'[^'\n]*+'|#[^\n]*+", re.DOTALL
+    r'"""(?:[^\\]|\\.)*?(?:"{3,5}|\Z)|' + r"'''.*?(?:'{3,5}|\Z)|" + r'"(?:[^"\\\n]|\\.)*+"?|' + r"'[^'\n]*+'?|#[^\n]*+",
+    re.DOTALL,
 )
 _LONG_KEY = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{MAX_PARTS}}}")
 

@@ -207,6 +207,29 @@ def test_no_text_is_read_with_anything_but_a_scenario_error(text):
         toml.loads(text)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        'x = {{k = """a"""", {key} = 1, c = "q"}}',
+        "x = {{k = '''a''''', {key} = 1, c = 'q'}}",
+        'x = """"""""\n{key} = 1',
+        'x = "a\\"b"\n{key} = 1',
+        "# it's\n{key} = 1 # '",
+    ],
+)
+def test_a_key_of_too_many_parts_hides_behind_no_string(text):
+    """The time to read such a key grows with the cube of its parts."""
+    with pytest.raises(ScenarioError, match="parts"):
+        toml.loads(text.format(key=".".join("k" * (toml.MAX_PARTS + 1))))
+
+
+@pytest.mark.parametrize("text", ['x = "{key}"', 'x = """\n{key}\n"""', "x = '''{key}'''", "x = 1 # {key}"])
+def test_in_a_string_or_a_comment_it_is_no_key(text):
+    with pytest.raises(ScenarioError) as error:
+        toml.loads(text.format(key=".".join("k" * (toml.MAX_PARTS + 1))))
+    assert "parts" not in str(error.value)
+
+
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
