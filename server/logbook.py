@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import re
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +29,14 @@ ROWS, SHOWN, DISTINCT = 20_000, 5, 12
 
 @dataclass(frozen=True)
 class Logbook:
-    """Logs by name, each a folder where saved scenarios look for theirs; nothing outside is read or written."""
+    """Logs by name, each a folder where saved scenarios look for theirs; nothing outside is read or written.
+
+    reading: held by the request that reads whole files, for one in memory is enough.
+    """
 
     settings: Settings
     shelf: Shelf
+    reading: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(1))
 
     def entries(self) -> list[dict[str, Any]]:
         """Every log with its files and the saved scenarios that use it."""
@@ -146,10 +151,9 @@ def _described(path: Path) -> dict[str, Any]:
 
 
 def _sheet(path: Path) -> dict[str, Any]:
-    sheet = tables.sheet(path, path.name)
-    rows = sheet.rows[:ROWS]
-    columns = [_column(name, [row[n].strip() for row in rows]) for n, name in enumerate(sheet.header)]
-    return {"format": "csv", "rows": len(sheet.rows), "columns": columns, "sample": rows[:SHOWN]}
+    sheet = tables.sheet(path, path.name, most=ROWS)
+    columns = [_column(name, [row[n].strip() for row in sheet.rows]) for n, name in enumerate(sheet.header)]
+    return {"format": "csv", "rows": sheet.count, "columns": columns, "sample": sheet.rows[:SHOWN]}
 
 
 def _column(name: str, cells: list[str]) -> dict[str, Any]:

@@ -75,6 +75,9 @@ def log_folder(scenario, extra: Sequence[Path | str] = ()) -> Path:
             problems.append(Problem(key, f"{name!r} leads out of {found}", "put the file itself there"))
         elif (found / name).stat().st_size > MAX_BYTES:
             problems.append(Problem(key, f"{name!r} is larger than {MAX_BYTES // 10**6} MB", "cut the log"))
+    if not problems and sum((found / name).stat().st_size for name in {name for _, name in files(mission)}) > MAX_BYTES:
+        many = f"the files of {mission.log!r} have more than {MAX_BYTES // 10**6} MB together"
+        problems.append(Problem("mission.log", many, "cut the log"))
     if problems:
         raise ScenarioError(problems)
     return found

@@ -60,6 +60,7 @@ An example, a vehicle with a compass and a Doppler log that ranges two moored be
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,8 +100,7 @@ def read_csv(scenario: NavigationScenario, mission: CsvRecording, folder: Path) 
     def open_(file: str, key: str) -> Sheet:
         if file not in opened:
             opened[file] = sheet(folder / file, key)
-        found = opened[file]
-        return Sheet(key, found.file, found.header, found.rows, found.lines)
+        return replace(opened[file], key=key)
 
     vehicles = {v.name: v for v in scenario.vehicles}
     parts: dict[str, dict] = {name: {} for name in vehicles}

@@ -18,13 +18,17 @@ PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 @dataclass(frozen=True)
 class Sheet:
-    """One file's rows as text, with the line each came from; `key` is where the scenario names the file."""
+    """One file's rows as text, with the line each came from; `key` is where the scenario names the file.
+
+    count: rows of the file, of which `rows` may be the first ones only.
+    """
 
     key: str
     file: str
     header: list[str]
     rows: list[list[str]]
     lines: list[int]
+    count: int
 
     def fault(self, row: int, column: str, message: str, remedy: str) -> ScenarioError:
         """The error about one cell."""
@@ -81,14 +85,17 @@ class Sheet:
             raise ScenarioError([Problem(self.key, message, f"its columns are: {', '.join(self.header)}")]) from None
 
 
-def sheet(path: Path, key: str) -> Sheet:
-    """Read a file with a header line, separated by comma, semicolon or tab. Raises ScenarioError."""
+def sheet(path: Path, key: str, most: int = MAX_ROWS) -> Sheet:
+    """Read a file with a header line, separated by comma, semicolon or tab. Raises ScenarioError.
+
+    most: rows to keep; the others are looked at and counted, and take no memory.
+    """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             first = file.readline()
             separator = max(",;\t", key=first.count)
             file.seek(0)
-            return _rows(csv.reader(file, delimiter=separator), path.name, key)
+            return _rows(csv.reader(file, delimiter=separator), path.name, key, most)
     except UnicodeDecodeError:
         problem = Problem(key, f"{path.name} is not UTF-8 text", "save it as UTF-8")
     except csv.Error as error:
@@ -98,23 +105,26 @@ def sheet(path: Path, key: str) -> Sheet:
     raise ScenarioError([problem])
 
 
-def _rows(reader, file: str, key: str) -> Sheet:
+def _rows(reader, file: str, key: str, most: int) -> Sheet:
     header = [h.strip() for h in next(reader, [])]
     rows: list[list[str]] = []
     lines: list[int] = []
+    count = 0
     for row in reader:
         if not any(cell.strip() for cell in row):
             continue
         if len(row) != len(header):
             message = f"{file} line {reader.line_num} has {len(row)} cells, the header {len(header)}"
             raise ScenarioError([Problem(key, message, "give every column a cell")])
-        if len(rows) >= MAX_ROWS:
+        count += 1
+        if count > MAX_ROWS:
             raise ScenarioError([Problem(key, f"{file} has more than {MAX_ROWS} rows", "cut the log")])
-        rows.append(row)
-        lines.append(reader.line_num)
+        if count <= most:
+            rows.append(row)
+            lines.append(reader.line_num)
     if not rows:
         raise ScenarioError([Problem(key, f"{file} has no rows", "give a header line and at least one row")])
-    return Sheet(key, file, header, rows, lines)
+    return Sheet(key, file, header, rows, lines, count)
 
 
 def stacked(sheet: Sheet, columns: Sequence[str]) -> np.ndarray:

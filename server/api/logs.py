@@ -13,7 +13,7 @@ from engine.scenario.navigation import NavigationScenario
 from engine.scenario.recording import CsvRecording, PyfgRecording
 from server.inline import from_json
 from server.preview import understood
-from server.site import Here
+from server.site import Here, Site
 
 router = APIRouter(prefix="/api", tags=["logs"])
 
@@ -33,9 +33,10 @@ def logs(here: Here) -> list[dict[str, Any]]:
 
 
 @router.get("/logs/{log}")
-def log(log: str, here: Here) -> dict[str, Any]:
+async def log(log: str, here: Here) -> dict[str, Any]:
     """A log's files: columns with samples, robots and points, or what is wrong with a file."""
-    return here.logbook.describe(log)
+    async with here.logbook.reading:
+        return await run_in_threadpool(here.logbook.describe, log)
 
 
 @router.put(
@@ -56,8 +57,13 @@ def delete(log: str, here: Here) -> None:
 
 
 @router.post("/logs/{log}/preview")
-def preview(log: str, body: Mapping, here: Here) -> dict[str, Any]:
+async def preview(log: str, body: Mapping, here: Here) -> dict[str, Any]:
     """What a scenario makes of a log: vehicles, sensors, readings, ranges, tracks to draw."""
+    async with here.logbook.reading:
+        return await run_in_threadpool(_understood, log, body, here)
+
+
+def _understood(log: str, body: Mapping, here: Site) -> dict[str, Any]:
     root = here.logbook.root(log)
     scenario = from_json(body.scenario)
     mission = getattr(scenario, "mission", None)

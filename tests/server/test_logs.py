@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 
+from server import logbook
 from tests.server.living import Live
 
 DRIVE = "t_s;forward;turn\n" + "".join(f"{t};1.0;0.0\n" for t in range(1, 61))
@@ -73,6 +75,36 @@ def test_files_are_described_by_their_columns(live: Live, harbour: str):
     }
     assert files["ranges.csv"]["columns"][1]["values"] == ["7"]
     assert live.http.put("/api/logs/harbour/drive.csv", content=DRIVE).status_code == 204
+
+
+def test_of_a_long_file_the_first_rows_are_described_and_all_are_counted(live: Live):
+    rows = 2 * logbook.ROWS
+    body = "t,a\n" + "".join(f"{n},x\n" for n in range(rows))
+    assert live.http.put("/api/logs/long/a.csv", content=body).status_code == 201
+    (file,) = live.http.get("/api/logs/long").json()["files"]
+    assert file["rows"] == rows and file["columns"][0]["max"] == logbook.ROWS - 1
+    live.http.put("/api/logs/long/a.csv", content=body + "1,2,3\n")
+    (file,) = live.http.get("/api/logs/long").json()["files"]
+    assert f"line {rows + 2} has 3 cells" in file["problem"]["message"]
+
+
+def test_whole_files_are_read_one_request_at_a_time(live: Live, harbour: str, monkeypatch):
+    """Eight of the largest files in memory at once would be more than a small machine has."""
+    inside, most = [], []
+    describe = logbook.Logbook.describe
+
+    def watched(self: logbook.Logbook, log: str) -> dict[str, Any]:
+        inside.append(log)
+        most.append(len(inside))
+        try:
+            return describe(self, log)
+        finally:
+            inside.pop()
+
+    monkeypatch.setattr(logbook.Logbook, "describe", watched)
+    with ThreadPoolExecutor(6) as pool:
+        answers = list(pool.map(lambda _: live.http.get(f"/api/logs/{harbour}").status_code, range(24)))
+    assert set(answers) == {200} and set(most) == {1}
 
 
 def test_a_mapping_is_tried_before_it_is_saved(live: Live, harbour: str):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.mission import fly
+from engine.mission import fly, logs
 from engine.mission.log import Log
 from engine.scenario import library, toml
 from engine.scenario.errors import ScenarioError
@@ -366,6 +366,16 @@ def test_a_link_that_leads_out_of_the_folder_is_not_followed(folder, tmp_path_fa
     (folder / "elsewhere").symlink_to(outside)
     with pytest.raises(ScenarioError, match="there is no folder 'elsewhere'"):
         read(folder, {"mission.log": "elsewhere"})
+
+
+def test_files_too_large_are_refused_before_they_are_read(folder, monkeypatch):
+    sizes = [len(text.encode()) for text in FILES.values()]
+    monkeypatch.setattr(logs, "MAX_BYTES", max(sizes))
+    with pytest.raises(ScenarioError, match=r"mission\.log: .*together"):
+        read(folder)
+    monkeypatch.setattr(logs, "MAX_BYTES", min(sizes) - 1)
+    with pytest.raises(ScenarioError, match="is larger than"):
+        read(folder)
 
 
 def test_a_missing_log_says_where_it_was_looked_for(tmp_path):
