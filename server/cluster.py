@@ -32,8 +32,11 @@ LOOK_S = 0.5
 GRACE_S = 0.6
 STOP_POLL_S = 0.1
 #: A worker that reaches its memory limit is ended, not slowed down. What Dask remembers for its own dashboard,
-#: estimates told by our runs among it, fills memory; nobody looks at it here.
+#: estimates told by our runs among it, fills memory; nobody looks at it here. Its schedulers and workers have web servers
+#: that ask nobody who he is: they are left with nothing to say.
 PROCESSES = {
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
     "distributed.admin.log-length": 500,
     "distributed.admin.low-level-log-length": 50,
     "distributed.diagnostics.computations.max-history": 5,

@@ -8,10 +8,10 @@ import logging
 import secrets
 import time
 from collections.abc import Callable
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import cookie_parser
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -54,6 +54,7 @@ class Guard:
         self.app, self.settings = app, settings
         self.cookie = f"{COOKIE}-{settings.port}"
         self._pass = secrets.token_urlsafe(32)
+        self._held = 0
         self._attempts = Attempts(clock)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -61,27 +62,18 @@ class Guard:
             await self.app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        refusal = self._host(headers) or self._origin(scope, headers)
-        if refusal is None and self.settings.token and scope["path"] not in OPEN and not self._inside(headers):
+        refusal = _ambiguous(headers) or self._host(headers) or self._origin(scope, headers)
+        if refusal is None and self.settings.token and not _open(scope) and not self._inside(headers):
             refusal = self._stranger(scope, headers)
             if refusal is None and not _bearer(headers):
                 await self._let_in(scope, headers)(scope, receive, _with_headers(send))
                 return
-        if scope["type"] == "websocket":
-            if refusal is None:
-                await self.app(scope, receive, send)
-            else:
-                await receive()
-                await send({"type": "websocket.close", "code": 1008, "reason": refusal.detail[:120]})
-            return
-        answer = _with_headers(send)
-        if refusal is None:
-            body = await self._body(scope, headers, receive)
-            if isinstance(body, bytes):
-                await self.app(scope, _replay(body, receive), answer)
-                return
-            refusal = body
-        await response(refusal)(scope, receive, answer)
+        if refusal is not None:
+            await response(refusal)(scope, receive, _with_headers(send))
+        elif scope["type"] == "websocket":
+            await self.app(scope, receive, send)
+        else:
+            await self._with_body(scope, headers, receive, _with_headers(send))
 
     def _host(self, headers: Headers) -> Refusal | None:
         """On loopback only loopback names are ours: another name means a page rebound its DNS to us."""
@@ -106,11 +98,7 @@ class Guard:
 
     def _inside(self, headers: Headers) -> bool:
         """Whether the cookie is there."""
-        try:
-            cookie = SimpleCookie(headers.get("cookie", "")).get(self.cookie)
-        except CookieError:
-            return False
-        return cookie is not None and _same(cookie.value, self._pass)
+        return _same(cookie_parser(headers.get("cookie", "")).get(self.cookie, ""), self._pass)
 
     def _stranger(self, scope: Scope, headers: Headers) -> Refusal | None:
         """Why one without a cookie may not enter; None with the right token, in a header or in a page's address."""
@@ -144,20 +132,38 @@ class Guard:
         answer.set_cookie(self.cookie, self._pass, httponly=True, samesite="strict", secure=secure, path="/")
         return answer
 
+    async def _with_body(self, scope: Scope, headers: Headers, receive: Receive, send: Send) -> None:
+        """Let the app answer once it has the whole body; no request here needs to be streamed in."""
+        limit = self._largest(scope)
+        length = _length(headers, limit)
+        share = length if length <= limit else 0  # what is too large is not kept
+        if self._held + share > self.settings.largest_bodies:
+            found = "too much is being sent at once; try again"
+            await response(Refusal(503, "crowded", found, headers={"retry-after": "5"}))(scope, receive, send)
+            return
+        self._held += share
+        try:
+            body = await self._body(limit, length, receive)
+            if isinstance(body, bytes):
+                await self.app(scope, _replay(body, receive), send)
+            else:
+                await response(body)(scope, receive, send)
+        finally:
+            self._held -= share
+
     def _largest(self, scope: Scope) -> int:
-        """Bytes that a request's body may have: a file of a recorded log more than others."""
+        """Bytes that a request's body may have: a file of a recorded log more than others, a stranger's none."""
+        if _open(scope):
+            return 0
         uploads = scope["method"] == "PUT" and scope["path"].startswith("/api/logs/")
         return self.settings.largest_log_file if uploads else self.settings.largest_body
 
-    async def _body(self, scope: Scope, headers: Headers, receive: Receive) -> bytes | Refusal:
-        """The whole body, or the refusal of one too large or too slow; no request here needs to be streamed in.
+    async def _body(self, limit: int, declared: int, receive: Receive) -> bytes | Refusal:
+        """The whole body, or the refusal of one too large or too slow.
 
         What is too large is still taken in for a while and thrown away: a client that is busy sending would
         not hear the answer.
         """
-        limit = self._largest(scope)
-        length = headers.get("content-length", "0")
-        declared = int(length) if length.isascii() and length.isdigit() and len(length) < 20 else limit + 1
         parts: list[bytes] = []
         size = 0
         try:
@@ -178,6 +184,27 @@ class Guard:
             return b"".join(parts)
         found = f"a request may carry at most {limit} bytes"
         return Refusal(413, "too-large", found, headers={"connection": "close"})
+
+
+def _ambiguous(headers: Headers) -> Refusal | None:
+    """Of two lengths a proxy before us may believe the other one, and take the rest for the next request."""
+    if "transfer-encoding" in headers and "content-length" in headers:
+        found = "a request gives its length once: by content-length or by transfer-encoding"
+        return Refusal(400, "http", found, headers={"connection": "close"})
+    return None
+
+
+def _open(scope: Scope) -> bool:
+    """Whether anybody may ask this."""
+    return scope["type"] == "http" and scope["method"] == "GET" and scope["path"] in OPEN
+
+
+def _length(headers: Headers, limit: int) -> int:
+    """Bytes of a body by the sender's word: of one sent in parts it may be all, of a word that is none too many."""
+    if "transfer-encoding" in headers:
+        return limit
+    length = headers.get("content-length", "0")
+    return int(length) if length.isascii() and length.isdigit() and len(length) < 20 else limit + 1
 
 
 def _same(given: str, right: str) -> bool:

@@ -87,8 +87,11 @@ def of_scenario(error: ScenarioError) -> Refusal:
     return Refusal(422, "scenario", str(error), errors)
 
 
-def _of_validation(error: RequestValidationError) -> Refusal:
+def _of_validation(request: Request, error: RequestValidationError) -> Refusal:
     """What the request's shape got wrong; never what it said, which may not even be JSON."""
+    given = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if given != "application/json" and any(e["loc"] == ("body",) for e in error.errors()):
+        return Refusal(415, "media-type", "send a JSON object, with content-type: application/json")
     errors = [
         {
             "key": ".".join(str(part) for part in e["loc"][1:]) or str(e["loc"][0]),
@@ -102,9 +105,13 @@ def _of_validation(error: RequestValidationError) -> Refusal:
     return Refusal(422, "request", detail, errors)
 
 
-def _of_http(error: HTTPException) -> Refusal:
-    kind = {404: "unknown", 405: "method"}.get(error.status_code, "http")
-    return Refusal(error.status_code, kind, str(error.detail), headers=dict(error.headers or {}))
+def _of_http(request: Request, error: HTTPException) -> Refusal:
+    kind, detail = "http", str(error.detail)
+    if error.status_code == 404:
+        kind, detail = "unknown", f"there is nothing at {request.url.path[:200]}; what there is, /api/docs says"
+    elif error.status_code == 405:
+        kind, detail = "method", f"{request.method[:20]} is not possible here; what is, /api/docs says"
+    return Refusal(error.status_code, kind, detail, headers=dict(error.headers or {}))
 
 
 def _name(asked: HTTPConnection) -> str:
@@ -123,13 +130,13 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, ScenarioError)
         return response(of_scenario(error))
 
-    async def bad_request(_: Request, error: Exception) -> Response:
+    async def bad_request(request: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
-        return response(_of_validation(error))
+        return response(_of_validation(request, error))
 
-    async def bad_http(_: Request, error: Exception) -> Response:
+    async def bad_http(request: Request, error: Exception) -> Response:
         assert isinstance(error, HTTPException)
-        return response(_of_http(error))
+        return response(_of_http(request, error))
 
     async def gone(asked: HTTPConnection, _: Exception) -> None:
         log.info("%s: the client went away", _name(asked))

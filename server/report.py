@@ -18,7 +18,9 @@ from server.artifacts import ARRAYS, RESULT, VERSIONS
 from server.inline import from_json
 from server.table import figures
 
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'self'"
+#: The page carries this with it wherever it is kept; a server says POLICY.
+INSIDE = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+POLICY = f"{INSIDE}; frame-ancestors 'self'"
 STYLE = """
 body{font:15px/1.5 system-ui,sans-serif;max-width:68rem;margin:2rem auto;padding:0 1rem;color:#1c2430;background:#fff}
 h1{margin-bottom:.2rem}h2{margin-top:2.2rem;border-bottom:1px solid #d5dae1}
@@ -42,6 +44,7 @@ def of_directory(directory: Path) -> str:
     title = escape(scenario.get("title", "Result"))
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+        f'<meta http-equiv="content-security-policy" content="{INSIDE}">'
         f'<meta name="viewport" content="width=device-width"><style>{STYLE}</style></head><body>'
         f"<h1>{title}</h1><p>{escape(scenario.get('summary', ''))}</p><p>{escape(scenario.get('source', ''))}</p>"
         f"<p>{_plural(result['trials'], 'trial')}, seed {result['seed']}. {escape(_versions(versions))}</p>"

@@ -25,8 +25,8 @@ class Settings:
     keeps statistics alone. most_work is trials x vehicles x mission seconds x algorithms of one job;
     jobs that ended keep_days ago, and the oldest while all take more than keep_bytes, are deleted unless pinned;
     least_free_disk (bytes) stays free on the disk of the data folder; of uploaded logs one file may have
-    largest_log_file bytes, all together largest_logs. slowest_head_s and slowest_body_s are how long the head and the
-    body of a request may take to arrive.
+    largest_log_file bytes, all together largest_logs. Bodies of requests held at once have largest_bodies bytes
+    together; slowest_head_s and slowest_body_s are how long the head and the body of one may take to arrive.
     """
 
     data: Path
@@ -40,8 +40,10 @@ class Settings:
     workers: int = max(os.cpu_count() or 1, 2)
     worker_memory: int | None = None
     largest_body: int = 2 * 1024 * 1024
+    largest_bodies: int = 512 * 1024 * 1024
     largest_log_file: int = 64 * 1024 * 1024
     largest_logs: int = 2 * 1024**3
+    most_connections: int = 1000
     slowest_head_s: float = 20.0
     slowest_body_s: float = 60.0
     most_trials: int = 100_000

@@ -42,6 +42,7 @@ class Sessions:
     def __init__(self, settings: Settings, jobs: Jobs) -> None:
         self.settings, self.jobs = settings, jobs
         self.panes: dict[str, Pane] = {}
+        self._opening = 0
         self._open: set[Session] = set()
 
     def open(self, send: Send) -> Session:
@@ -60,14 +61,23 @@ class Sessions:
         for session in list(self._open):
             await self.shut(session)
 
-    async def add(self) -> tuple[str, Pane]:
-        """A new pane under a secret id; Refusal where there are too many."""
-        if len(self.panes) >= self.settings.panes_altogether:
+    async def add(self, count: int) -> list[tuple[str, Pane]]:
+        """New panes under secret ids, all of them; Refusal where that is too many."""
+        if len(self.panes) + self._opening + count > self.settings.panes_altogether:
             raise Refusal(429, "panes", "too many 3D panes are open on this server; close some")
-        pane = await asyncio.to_thread(Pane)
-        id = secrets.token_urlsafe(18)
-        self.panes[id] = pane
-        return id, pane
+        self._opening += count
+        opened: dict[str, Pane] = {}
+        try:
+            for _ in range(count):
+                opened[secrets.token_urlsafe(18)] = await asyncio.to_thread(Pane)
+        except BaseException:
+            for pane in opened.values():
+                await asyncio.to_thread(pane.close)
+            raise
+        finally:
+            self._opening -= count
+        self.panes |= opened
+        return list(opened.items())
 
     async def remove(self, id: str) -> None:
         pane = self.panes.pop(id, None)
@@ -99,6 +109,8 @@ class Session:
         """Act on a message of the browser; what is wrong with it is told, not raised."""
         try:
             message = json.loads(text)
+            if not isinstance(message, dict) or "type" not in message:
+                raise ValueError("a message is an object with a type")
             kind = message["type"]
             if kind == "show":
                 await self._show(str(message["job"]), [str(name) for name in message["panes"]])
@@ -112,7 +124,7 @@ class Session:
                 raise ValueError(f"there are no messages of type {str(kind)[:40]!r}")
         except Refusal as refusal:
             await self._send({"type": "error", "detail": refusal.detail})
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             await self._send({"type": "error", "detail": f"message not understood: {error}"})
 
     async def close(self) -> None:
@@ -139,11 +151,10 @@ class Session:
             self._footage = self._chart = self._moment = self._job = self._ensembles = None
             for name in [n for n in self._panes if n not in names]:
                 await self._drop(name)
-            for name in names:
-                if name not in self._panes:
-                    id, pane = await self._sessions.add()
-                    self._panes[name] = id, pane
-                    self._cameras.join(pane)
+            new = [name for name in names if name not in self._panes]
+            for name, (id, pane) in zip(new, await self._sessions.add(len(new))):
+                self._panes[name] = id, pane
+                self._cameras.join(pane)
         panes = {name: f"/scenes/{self._panes[name][0]}/" for name in names}
         await self._send({"type": "scenes", "panes": panes})
         self._following = asyncio.create_task(self._follow(job, found.algorithms))

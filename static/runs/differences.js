@@ -75,11 +75,12 @@ function* leaves(value, path = "") {
   }
 }
 
-/** Rows as CSV text. */
+/** Rows as CSV text. Text that a spreadsheet would compute (=, +, -, @ first) gets an apostrophe before it; numbers none. */
 export function csv(rows) {
   const cell = (value) => {
-    const text = value === null || value === undefined ? "" : String(value);
-    return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+    let text = value === null || value === undefined ? "" : String(value);
+    if (typeof value === "string" && /^[=+\-@\t\r]/.test(text)) text = `'${text}`;
+    return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
   };
   return rows.map((row) => row.map(cell).join(",")).join("\r\n") + "\r\n";
 }

@@ -153,6 +153,14 @@ def test_the_table_is_copied_as_csv(opened: Page, server: Server, run: str, view
     assert float(row["low"]) == pytest.approx(mean - half) and float(row["high"]) == pytest.approx(mean + half)
 
 
+def test_a_spreadsheet_computes_no_text_of_ours(opened: Page):
+    """A title or a tag that begins like a formula stays text; a number below zero stays a number."""
+    rows = [["=1+1", "@a", "-2", "a,b", "x\ry"], [-2, None, "+3"]]
+    script = 'async (rows) => (await import("/static/runs/differences.js")).csv(rows)'
+    read = list(csv.reader(io.StringIO(opened.evaluate(script, rows), newline="")))
+    assert read == [["'=1+1", "'@a", "'-2", "a,b", "x\ry"], ["-2", "", "'+3"]]
+
+
 def test_the_table_is_copied_as_latex(opened: Page):
     opened.locator(".chip", has_text=re.compile("^ship$")).click()
     text = copied(opened, "LaTeX")

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import gzip
 import io
+import json
 import pickle
 import socket
 import ssl
 import zipfile
 from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -28,6 +29,7 @@ from websockets.sync.client import connect
 
 from server import artifacts
 from server.attempts import FREE
+from server.guard import OPEN
 from server.scenes import inner, relay
 from server.settings import Settings
 from tests.server.living import PATIENCE_S, SHORT, Live, start, until
@@ -36,6 +38,7 @@ TOKEN = "a-token-of-at-least-24-letters"
 MIB = 2**20
 JSON, TOML = {"content-type": "application/json"}, {"content-type": "application/toml"}
 CSV = {"content-type": "text/csv"}
+CHUNKED = {"transfer-encoding": "chunked"}
 BINARY, ZIPPED = {"content-type": "application/octet-stream"}, JSON | {"content-encoding": "gzip"}
 EVIL = {"origin": "http://evil.example"}
 
@@ -110,6 +113,9 @@ ATTACKS = [
     ("the same, quoted", "PUT", "/api/scenarios/mine", TOML, '" . "' + '." . "' * (MIB // 8) + " = 1", {422}),
     ("a TOML integer of 5000 digits", "PUT", "/api/scenarios/mine", TOML, "schema = " + "9" * 5000, {422}),
     ("a TOML integer of 4 million bits", "PUT", "/api/scenarios/mine", TOML, "schema = 0x" + "f" * MIB, {422}),
+    ("TOML strings without an end", "PUT", "/api/scenarios/mine", TOML, '\\"""\n' * (MIB // 5), {422}),
+    ("the same, on one line", "PUT", "/api/scenarios/mine", TOML, 'a = "' + '\\"' * (MIB // 2), {422}),
+    ("the same as a value", "POST", "/api/jobs", JSON, with_set("seed", json.dumps('\\"' * (MIB // 4))), {422}),
     ("a hundred thousand unknown keys", "PUT", "/api/scenarios/mine", TOML, UNKNOWN, {422}),
     ("a pickle as a scenario", "PUT", "/api/scenarios/mine", BINARY, pickle.dumps({}), {415, 422}),
     ("code named as an algorithm", "POST", "/api/jobs", JSON, with_algorithm("os:system"), {422}),
@@ -125,6 +131,15 @@ ATTACKS = [
     ("a log read from elsewhere", "POST", "/api/jobs", JSON, RECORDED % "../../../etc", {404, 422}),
     ("the same, from the root", "POST", "/api/jobs", JSON, RECORDED % "/etc", {404, 422}),
     ("a method that is none", "TRACE", "/", {}, "", {405}),
+    ("a request hidden in another's body", "POST", "/api/jobs", JSON | CHUNKED, "0\r\n\r\nGET /api/jobs", {400}),
+    ("a length that is none", "POST", "/api/jobs", JSON | {"content-length": "+5"}, "12345", {400}),
+    ("a length below nothing", "POST", "/api/jobs", JSON | {"content-length": "-1"}, "1", {400}),
+    ("an unknown encoding of the body", "POST", "/api/jobs", {"transfer-encoding": "xchunked"}, "0\r\n\r\n", {400}),
+    ("a line end in a path", "GET", "/api/jobs/x%0d%0aset-cookie:a=b", {}, "", {404}),
+    ("a null byte in a head", "GET", "/", {"x": "a\0b"}, "", {400}),
+    ("a head that is none", "\0", "/", {}, "", {400}),
+    ("a form instead of JSON", "POST", "/api/jobs", {"content-type": "text/plain"}, '{"scenario":"first-look"}', {415}),
+    ("a link to somebody else's server", "GET", "http://evil.example/api/jobs", {}, "", {404}),
 ]  # fmt: skip
 
 
@@ -137,6 +152,9 @@ def test_an_attack_is_answered_by_a_problem_and_leaves_nothing_behind(
     before = data_files()
     status, told = raw(live, method, path, headers, body)
     assert status in answers, told[:300]
+    problem = json.loads(told)
+    assert problem["status"] == status and problem["type"].startswith("urn:coopnav:")
+    assert problem["title"] and problem["detail"]
     for leak in (b"Traceback", b"root:", b"SQLite", b"import "):
         assert leak not in told
     assert data_files() == before
@@ -171,8 +189,8 @@ def answer(wire: socket.socket) -> tuple[int, bytes]:
 @pytest.mark.parametrize("headers", [EVIL, {"origin": "null"}, {"host": "evil.example"}])
 def test_a_websocket_of_another_site_is_not_opened(live: Live, path: str, headers: dict[str, str]):
     handshake = {"connection": "Upgrade", "upgrade": "websocket", "sec-websocket-version": "13"}
-    status, _ = raw(live, "GET", path, handshake | {"sec-websocket-key": "AAAAAAAAAAAAAAAAAAAAAA=="} | headers, "")
-    assert status == 403
+    status, told = raw(live, "GET", path, handshake | {"sec-websocket-key": "AAAAAAAAAAAAAAAAAAAAAA=="} | headers, "")
+    assert status == 403 and json.loads(told)["type"] in ("urn:coopnav:origin", "urn:coopnav:host")
 
 
 def test_no_answer_lets_another_site_read_it(live: Live):
@@ -217,6 +235,48 @@ def test_a_client_that_never_ends_its_body_is_told_and_hung_up_on(walled: Live):
     assert raw(walled, "POST", "/api/jobs", headers, '{"scenario":')[0] == 408
 
 
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    """A server for few, and for little at once."""
+    settings = Settings(
+        data=tmp_path_factory.mktemp("small"), port=0, workers=1, most_connections=8, largest_bodies=1000
+    )
+    yield from start(settings, ready=lambda _: True)
+
+
+def test_connections_too_many_are_told_and_hung_up_on_and_websockets_count(small: Live):
+    where = urlsplit(small.url)
+    with ExitStack() as crowd:
+        for _ in range(3):
+            crowd.enter_context(connect(f"{small.ws}/api/scenes/session"))
+        for _ in range(3):
+            crowd.enter_context(closing(socket.create_connection((where.hostname, where.port), PATIENCE_S)))
+
+        def refused() -> httpx.Response | None:
+            wire = crowd.enter_context(closing(socket.create_connection((where.hostname, where.port), PATIENCE_S)))
+            wire.sendall(b"GET /api/health/live HTTP/1.1\r\nhost: localhost\r\n\r\n")
+            head, _, body = wire.recv(65536).partition(b"\r\n\r\n")
+            return json.loads(body) if b" 503 " in head and b"retry-after" in head else None
+
+        assert until(refused, "the refusal")["type"] == "urn:coopnav:crowded"
+        wire = crowd.enter_context(closing(socket.create_connection((where.hostname, where.port), PATIENCE_S)))
+        assert answer(wire)[0] == 0, "one too many that says nothing is hung up on"
+    until(lambda: httpx.get(f"{small.url}/api/health/live").status_code == 200, "room again")
+
+
+def test_bodies_that_are_held_at_once_are_bounded(small: Live):
+    where = urlsplit(small.url)
+    head = b"POST /api/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-length: 900\r\n\r\n"
+    with closing(socket.create_connection((where.hostname, where.port), PATIENCE_S)) as wire:
+        wire.sendall(head)
+        crowded = until(
+            lambda: (a := httpx.post(f"{small.url}/api/jobs", content=b" " * 200)).status_code == 503 and a,
+            "the refusal",
+        )
+        assert crowded.json()["type"] == "urn:coopnav:crowded" and "retry-after" in crowded.headers
+    until(lambda: httpx.post(f"{small.url}/api/jobs", content=b" " * 200).status_code == 415, "room again")
+
+
 def test_a_head_without_end_is_refused(live: Live):
     assert raw(live, "GET", "/", {"x-long": "x" * 200_000}, "")[0] in (0, 400, 431)
 
@@ -246,11 +306,22 @@ def test_without_the_token_nothing_is_told(walled: Live, path: str):
     assert httpx.get(walled.url + path, cookies={f"coopnav-{urlsplit(walled.url).port}": TOKEN}).status_code == 401
 
 
+def test_without_the_token_no_route_does_anything_but_say_that_the_server_lives(walled: Live):
+    for path, methods in walled.app.openapi()["paths"].items():
+        for method in methods:
+            status = httpx.request(method, walled.url + path.replace("{", "").replace("}", "")).status_code
+            assert status == 401 or path in OPEN, (method, path)
+    for path in OPEN:
+        assert httpx.get(walled.url + path).status_code in (200, 503)
+        assert httpx.post(walled.url + path).status_code == 401
+        assert httpx.request("GET", walled.url + path, content=b"x").status_code == 413
+
+
 def test_without_the_token_no_websocket_is_opened_and_nothing_is_changed(walled: Live):
-    with pytest.raises(InvalidStatus), connect(f"{walled.ws}/api/scenes/session"):
-        pass
-    with pytest.raises(InvalidStatus), connect(f"{walled.ws}/api/scenes/session?token={TOKEN}"):
-        pass
+    for path in ("/api/scenes/session", f"/api/scenes/session?token={TOKEN}", "/scenes/guess"):
+        with pytest.raises(InvalidStatus) as refused, connect(walled.ws + path):
+            pass
+        assert refused.value.response.status_code == 401
     assert httpx.post(f"{walled.url}/api/jobs?token={TOKEN}", json=SHORT).status_code == 401
 
 
@@ -261,6 +332,8 @@ def test_the_token_works_once_in_an_address_and_then_as_a_cookie(walled: Live):
         assert TOKEN not in str(first.headers)
         assert browser.get("/").status_code == 200
         cookie = first.headers["set-cookie"].partition(";")[0]
+        for others in ("a={b}; ", '"; ', 'x="\\"; ', "=; "):  # of other servers on this machine
+            assert httpx.get(walled.url, headers={"cookie": others + cookie}).status_code == 200
     with connect(f"{walled.ws}/api/scenes/session", additional_headers={"cookie": cookie}):
         pass
 
@@ -280,6 +353,14 @@ def test_guessing_the_token_is_slowed_down_while_those_inside_go_on(walled: Live
         late = httpx.get(f"{walled.url}/?token={TOKEN}")
         assert late.status_code == 429 and int(late.headers["retry-after"]) > 0
         assert browser.get("/").status_code == 200
+
+
+def test_who_sends_a_wrong_token_cannot_say_that_it_was_somebody_else(walled: Live):
+    answers = set()
+    for n in range(2 * FREE):
+        headers = {"x-forwarded-for": f"10.0.0.{n}"}
+        answers.add(httpx.get(f"{walled.url}/?token=guess{n}", headers=headers).status_code)
+    assert 429 in answers
 
 
 # --- inside ports -------------------------------------------------------------------------------------------------
@@ -332,6 +413,25 @@ def test_dasks_ports_talk_to_nobody_without_this_runs_certificate(live: Live):
                 raise ConnectionResetError
 
 
+def test_dasks_web_servers_have_nothing_to_say(live: Live):
+    """They ask nobody who he is, and would tell the names of jobs and what workers do."""
+    site = live.app.state.site
+    scheduler = site.cluster._own.scheduler
+    ports = [scheduler.http_server.port]
+    ports += [port for worker in scheduler.workers.values() for port in worker.services.values()]
+    assert len(ports) > len(scheduler.workers)
+    for port in ports:
+        for path in (
+            "/",
+            "/info/main/workers.html",
+            "/json/identity.json",
+            "/metrics",
+            "/proxy/80/localhost/",
+            "/health",
+        ):
+            assert httpx.get(f"http://127.0.0.1:{port}{path}").status_code == 404, path
+
+
 # --- files --------------------------------------------------------------------------------------------------------
 
 
@@ -368,6 +468,17 @@ def test_a_link_among_the_uploaded_logs_is_not_followed(live: Live, tmp_path: Pa
         (shelf / "linked-log").unlink()
         (shelf / "own-log" / "x.csv").unlink()
         (shelf / "own-log").rmdir()
+
+
+def test_what_a_scenario_says_is_text_in_a_report_and_the_page_runs_nothing(live: Live):
+    evil = "<img src=x onerror=alert(1)>\"'</title></pre><script>alert(1)</script>"
+    scenario = live.http.get("/api/scenarios/first-look").json()["scenario"]
+    claims = [claim | {"text": evil} for claim in scenario["claims"]]
+    body = {"scenario": scenario | {"title": evil, "summary": evil, "source": evil, "claims": claims}}
+    answer = live.http.get(f"/api/jobs/{live.done(SHORT | body)['id']}/report")
+    assert "<img" not in answer.text and "<script" not in answer.text and "&lt;img src=x" in answer.text
+    assert "default-src 'none'" in answer.headers["content-security-policy"]
+    assert 'http-equiv="content-security-policy" content="default-src \'none\'' in answer.text
 
 
 class Bomb:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
+import sqlite3
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from engine.scenario import library, toml
+from server import serving
 from server.cli import main
+from server.recovery import DATABASE
+from server.store import Store
 
 QUICK = ["--set", "duration_s=120", "--set", "report_interval_s=4", "--workers", "1"]
 
@@ -145,6 +150,22 @@ def test_a_port_in_use_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str
         port = str(taken.getsockname()[1])
         assert main(["serve", "--port", port, "--data", str(tmp_path)]) == 2
     assert "--port" in capsys.readouterr().err
+
+
+def test_a_data_folder_has_one_server(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    with serving.occupy(tmp_path):
+        assert main(["serve", "--port", "0", "--data", str(tmp_path)]) == 2
+    assert f"process {os.getpid()} keeps its data" in capsys.readouterr().err
+    serving.occupy(tmp_path).close()
+
+
+def test_data_of_a_later_version_is_told_and_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    Store(tmp_path / DATABASE).close()
+    with sqlite3.connect(tmp_path / DATABASE) as db:
+        db.execute("PRAGMA user_version=99")
+    assert main(["serve", "--port", "0", "--data", str(tmp_path)]) == 2
+    assert "later version" in capsys.readouterr().err
+    assert sqlite3.connect(tmp_path / DATABASE).execute("PRAGMA user_version").fetchone() == (99,)
 
 
 def test_an_unknown_command_is_told(capsys: pytest.CaptureFixture[str]):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -15,8 +17,10 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from server.problems import Refusal
 from server.scenes import palette, relay
 from server.scenes.cameras import ABOVE, OBLIQUE
+from server.scenes.sessions import Sessions
 from tests.server.living import PATIENCE_S, SHORT, Live, until
 
 
@@ -206,6 +210,8 @@ def test_two_sessions_share_nothing(live: Live, job: str):
         '{"type": "show", "job": "nosuchjob", "panes": []}',
         '{"type": "seek", "time_s": NaN}',
         '{"type": "seek", "time_s": "x"}',
+        '{"type": "seek", "time_s": 1' + "0" * 400 + "}",
+        '{"type": "camera", "pose": [0, 0, 0, 0, 0, 1' + "0" * 400 + "]}",
         '{"type": "options", "trails": 3}',
         '{"type": "options", "glitter": true}',
         '{"type": "options", "sigma": 4}',
@@ -230,6 +236,20 @@ def test_panes_are_limited(live: Live, job: str):
         assert "at most 6" in json.loads(mine.socket.recv(timeout=PATIENCE_S))["detail"]
         mine.say(type="show", job=job, panes=["teleportation"])
         assert "teleportation" in json.loads(mine.socket.recv(timeout=PATIENCE_S))["detail"]
+
+
+def test_panes_are_limited_altogether_however_many_ask_at_once(live: Live):
+    scenes = Sessions(replace(live.settings, panes_altogether=3), live.app.state.site.jobs)
+
+    async def ask() -> list[Any]:
+        answers = await asyncio.gather(*(scenes.add(2) for _ in range(4)), return_exceptions=True)
+        for id in list(scenes.panes):
+            await scenes.remove(id)
+        return answers
+
+    answers = asyncio.run(ask())
+    refused = [a for a in answers if isinstance(a, Refusal)]
+    assert len(refused) == 3 and all(r.status == 429 for r in refused)
 
 
 def test_a_page_of_another_site_opens_no_session(live: Live):
