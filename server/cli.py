@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -142,24 +142,25 @@ def _names(text: str) -> list[str]:
 
 
 def _port(text: str) -> int:
-    port = int(text)
-    if not 0 <= port < 65536:
-        raise argparse.ArgumentTypeError("a port is a number from 0 to 65535")
-    return port
+    return int(_number(text, int, lambda port: 0 <= port < 65536, "a port is a number from 0 to 65535"))
 
 
 def _positive(text: str) -> float:
-    number = float(text)
-    if not 0 < number < float("inf"):
-        raise argparse.ArgumentTypeError("a number above 0 is needed")
-    return number
+    return _number(text, float, lambda number: 0 < number < float("inf"), "give a number above 0")
 
 
 def _count(text: str) -> int:
-    count = int(text)
-    if count < 1:
-        raise argparse.ArgumentTypeError("at least 1 is needed")
-    return count
+    return int(_number(text, int, lambda count: count >= 1, "give a whole number, at least 1"))
+
+
+def _number(text: str, read: Callable[[str], float], fits: Callable[[float], bool], remedy: str) -> float:
+    try:
+        number = read(text)
+    except ValueError:
+        number = None
+    if number is None or not fits(number):
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}: {remedy}")
+    return number
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hashlib
-import itertools
 import json
 import logging
 import math
@@ -15,7 +14,6 @@ import sqlite3
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any, TypeVar
 
 from engine import runner, statistics
@@ -23,29 +21,25 @@ from engine.scenario import toml
 from engine.scenario.errors import ScenarioError
 from engine.scenario.models import ScenarioBase
 from engine.statistics import Batch
-from server import artifacts, cost, logs, view, work
+from server import cost, logs
 from server.cluster import Cluster
 from server.flow import Flow
 from server.journal import Journal
 from server.plan import Plan
 from server.problems import Refusal, disk_full
 from server.recovery import write_record
+from server.results import OUTLINE, NothingLeft, Results
 from server.retention import superfluous
 from server.settings import Settings
 from server.store import FINAL, Job, Store
 from server.watch import Watch
-from server.wire import dumps
 
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
-OUTLINE, VIEW = "outline.json", "view.json"
-FILES = (artifacts.RESULT, artifacts.ARRAYS, artifacts.VERSIONS, VIEW)
 #: Old jobs are looked for this often at least.
 TIDY_S = 3600.0
-#: So many files are remembered to be as they were written.
-MOST_CHECKED = 2000
 #: A what-if job that takes more worker seconds stands in line like any other.
 WHAT_IF_S = 120.0
 #: Submissions that are worked on at once.
@@ -56,10 +50,6 @@ AGAIN_S = 1.0
 
 class TimeIsUp(Exception):
     """The job ran as long as it may."""
-
-
-class NothingLeft(Exception):
-    """Every block of trials lost a shard."""
 
 
 def now() -> str:
@@ -90,15 +80,14 @@ class Jobs:
 
     def __init__(self, store: Store, journal: Journal, cluster: Cluster, settings: Settings) -> None:
         self.store, self.journal = store, journal
+        self.results = Results(store, settings.data / "jobs")
         self._cluster, self._settings = cluster, settings
         self._flow = Flow(cluster)
         # Python's threads take turns with the event loop: few at work on jobs leave it time to answer.
         self.accepting = asyncio.Semaphore(MOST_ACCEPTING)
         self._planning, self._assembling = asyncio.Semaphore(1), asyncio.Semaphore(1)
         self._ended = asyncio.Event()
-        self._checked: dict[Path, tuple[int, int, int]] = {}
         self._tidying: asyncio.Task[None] | None = None
-        self._folder = settings.data / "jobs"
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._clients: dict[str, str] = {}
         self._running: dict[str, Watch] = {}
@@ -151,7 +140,7 @@ class Jobs:
         self.admit(wanted.client)
         id = secrets.token_hex(8)
         self._clients[id] = wanted.client  # from here on it counts
-        folder = self._folder / id
+        folder = self.results.folders / id
         try:
             await asyncio.to_thread(self._check_room, price)
             job = Job(
@@ -185,7 +174,7 @@ class Jobs:
         finally:
             if id not in self._tasks:
                 del self._clients[id]
-                await asyncio.to_thread(shutil.rmtree, folder, True)
+                await asyncio.to_thread(self.results.remove, id)
 
     def _check_room(self, price: cost.Cost) -> None:
         """Refusal 507 where the disk has no room for a result and its shards."""
@@ -212,8 +201,8 @@ class Jobs:
         if changed is not None and task is not None:
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
-            await asyncio.to_thread(self._drop_shards, id)
-            await asyncio.to_thread(self._note_record, id)
+            await asyncio.to_thread(self.results.drop_shards, id)
+            await asyncio.to_thread(self.results.note, id)
         return self.find(id)
 
     async def delete(self, id: str) -> None:
@@ -221,77 +210,30 @@ class Jobs:
         await self.cancel(id)
         await asyncio.to_thread(self.store.delete, id)
         self.journal.wake()
-        await asyncio.to_thread(shutil.rmtree, self._folder / id, True)
+        await asyncio.to_thread(self.results.remove, id)
 
     def mark(self, id: str, **marks: Any) -> Job:
         """Keep a person's marks on a job; Refusal 404 where there is none."""
         self.store.mark(id, **marks)
         job = self.find(id)
-        self._note_record(id)
+        self.results.note(id)
         return job
 
     async def tidy(self) -> None:
         """Delete the jobs that are to make room, now and whenever one has ended or an hour has passed."""
         while True:
-            going = await asyncio.to_thread(superfluous, self.store, self._folder, self._settings)
+            going = await asyncio.to_thread(superfluous, self.store, self.results.folders, self._settings)
             for job in going:
                 if await asyncio.to_thread(self.store.drop, job.id):
                     log.info("job %s is old and makes room", job.id)
-                    await asyncio.to_thread(shutil.rmtree, self._folder / job.id, True)
+                    await asyncio.to_thread(self.results.remove, job.id)
             self._ended.clear()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._ended.wait(), TIDY_S)
 
     def find(self, id: str) -> Job:
         """The job of an id; Refusal 404 where there is none."""
-        job = self.store.job(id)
-        if job is None:
-            raise Refusal(404, "unknown-job", "there is no such job")
-        return job
-
-    def artifact(self, id: str, name: str) -> Path:
-        """A file of a finished job; Refusal 409 before it is there, 410 where it is not as it was written."""
-        job = self.find(id)
-        if job.state != "done":
-            raise Refusal(409, "not-done", f"the job is {job.state}; it has no result")
-        path = self._folder / job.id / name
-        if not self._as_written(path):
-            log.error("%s is not as it was written", path)
-            raise Refusal(410, "damaged", f"{name} of this job was damaged on the disk; run the job again")
-        return path
-
-    def _as_written(self, path: Path) -> bool:
-        """Whether a file has the checksum noted for it; it is read once for every time that it changes."""
-        try:
-            found = path.stat()
-        except FileNotFoundError:
-            return False
-        version = (found.st_ino, found.st_size, found.st_mtime_ns)
-        if self._checked.get(path) == version:
-            return True
-        noted = artifacts.read_sums(path.parent).get(path.name)
-        if noted is not None and artifacts.sha256(path) != noted:
-            return False
-        if len(self._checked) >= MOST_CHECKED:
-            self._checked.clear()
-        self._checked[path] = version
-        return True
-
-    def view(self, id: str) -> str | None:
-        """The view as JSON text: the finished one, or of what there is so far; None before anything."""
-        job = self.find(id)
-        if job.state == "done":
-            return self.artifact(id, VIEW).read_text(encoding="utf-8")
-        parts = self._parts(job)
-        outline = self.outline(id)
-        if outline is None or not parts:
-            return None
-        return dumps(view.build(outline, parts, job.algorithms))
-
-    def outline(self, id: str) -> dict[str, Any] | None:
-        """The outline of a job's mission once a worker has told it."""
-        path = self._folder / id / OUTLINE
-        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+        return self.results.find(id)
 
     def hear(self, message: dict[str, Any]) -> None:
         """Take in what a running shard tells."""
@@ -314,7 +256,7 @@ class Jobs:
             log.exception("job %s failed", job.id, exc_info=error)
             # Other shards may still be telling; nothing may be recorded after the final state.
             self._running.pop(job.id, None)
-            await asyncio.to_thread(self._drop_shards, job.id)
+            await asyncio.to_thread(self.results.drop_shards, job.id)
             await self._record(job.id, state="failed", finished_at=now(), error=_told(error))
         finally:
             self._running.pop(job.id, None)
@@ -331,26 +273,20 @@ class Jobs:
                 await asyncio.sleep(AGAIN_S)
             else:
                 break
-        await asyncio.to_thread(self._note_record, id)
+        await asyncio.to_thread(self.results.note, id)
         self.journal.wake()
         self._ended.set()
 
-    def _note_record(self, id: str) -> None:
-        job = self.store.job(id)
-        with contextlib.suppress(OSError):  # a copy without it computes the job again
-            if job is not None:
-                write_record(self._folder / id, job)
-
     async def _compute(self, job: Job) -> None:
-        folder = self._folder / job.id
+        folder = self.results.folders / job.id
         await asyncio.to_thread(folder.mkdir, parents=True, exist_ok=True)
         async with self._planning:
             scenario, shards = await asyncio.to_thread(_planned, job)
-            await asyncio.to_thread(self._check_shards, job.id)
+            await asyncio.to_thread(self.results.check_shards, job.id)
         finished = {*self.store.shards(job.id), *self.store.lost(job.id)}
         watch = self._running[job.id] = Watch(job, len(shards), finished, self.journal, folder / OUTLINE)
         watch.resume(self.store)
-        plan = Plan(job, shards, self.store, watch, lambda number: self._shard_file(job.id, number))
+        plan = Plan(job, shards, self.store, watch, lambda number: self.results.shard_file(job.id, number))
         self._flow.join(plan)
         limit_s = min(job.limit_s or math.inf, self._settings.longest_job_s)
         limit = asyncio.timeout(limit_s)
@@ -371,63 +307,11 @@ class Jobs:
             await plan.settled.wait()
         async with self._assembling:
             lost = list(self.store.lost(job.id).values())
-            notes = await _to_the_end(self._assemble, job, scenario, lost)
+            notes = await _to_the_end(self.results.assemble, job, scenario, lost)
         for algorithm, (done, seconds) in plan.cost.items():
             await asyncio.to_thread(self.store.worked, algorithm, job.family, done, seconds)
         await self._record(job.id, state="done", progress=1.0, finished_at=now(), notes=notes, lost=lost)
-        await asyncio.to_thread(self._drop_shards, job.id)
-
-    def _check_shards(self, id: str) -> None:
-        """Forget finished shards whose files are not as they were written: they run again."""
-        for number, digest in self.store.shards(id).items():
-            path = self._shard_file(id, number)
-            if not path.is_file() or artifacts.sha256(path) != digest:
-                log.warning("job %s: the file of shard %d is damaged; it runs again", id, number)
-                self.store.forget_shard(id, number)
-
-    def _assemble(self, job: Job, scenario: ScenarioBase, lost: list[dict[str, Any]]) -> list[str]:
-        """Write the files of a finished job; what its algorithms, and shards given up, want to be known."""
-        gaps = {entry["trials"][0] for entry in lost}
-        parts = [part for part in self._parts(job) if part[0].trials[0] not in gaps]
-        if not parts:
-            raise NothingLeft("; ".join(map(_loss, lost)))
-        folder = self._folder / job.id
-        outline = self.outline(job.id) or work.outline(scenario)
-        artifacts.write_text(folder / VIEW, dumps(view.build(outline, parts, job.algorithms)))
-        notes = [_loss(entry) for entry in lost]
-        if job.keep == "statistics":
-            result = runner.gather(statistics.shown(scenario), parts, job.algorithms)
-            artifacts.write_result(folder, result)
-            told = statistics.told(scenario, result.time_s, self._totals(job, parts), lost)
-            artifacts.write_statistics(folder, told)
-            notes.append(f"figures are of {told['trials']} trials, tracks and curves of the first {result.trials}")
-        else:
-            result = runner.gather(scenario, parts, job.algorithms, lost)
-            artifacts.write_result(folder, result)
-            told = result.to_json()
-        graphs = [artifacts.graph_file(name) for name, tracks in result.tracks.items() if tracks.graph]
-        artifacts.write_sums(folder, [*FILES, *graphs])
-        return notes + [f"{name}: {note}" for name, answer in told["algorithms"].items() for note in answer["notes"]]
-
-    def _totals(self, job: Job, parts: view.Parts) -> statistics.Totals:
-        """What all trials left: those kept whole, and one batch after the other."""
-        whole = statistics.of_tracks(parts[0][1], {shard.algorithm: tracks for shard, _, tracks in parts})
-        batches = (n for n in self.store.shards(job.id) if n >= len(job.algorithms))
-        read = (artifacts.read_totals(self._shard_file(job.id, n)) for n in batches)
-        return statistics.merged(itertools.chain([whole], read))
-
-    def _parts(self, job: Job) -> view.Parts:
-        with contextlib.suppress(FileNotFoundError):
-            whole = len(job.algorithms) if job.keep == "statistics" else math.inf
-            return [artifacts.read_shard(self._shard_file(job.id, n)) for n in self.store.shards(job.id) if n < whole]
-        return []
-
-    def _shard_file(self, id: str, number: int) -> Path:
-        return self._folder / id / f"shard-{number}.npz"
-
-    def _drop_shards(self, id: str) -> None:
-        for path in (self._folder / id).glob("shard-*.npz"):
-            path.unlink(missing_ok=True)
+        await asyncio.to_thread(self.results.drop_shards, job.id)
 
 
 def _planned(job: Job) -> tuple[ScenarioBase, list[runner.Shard | Batch]]:
@@ -454,15 +338,6 @@ def _same(known: Job, digest: str) -> Job:
     if known.digest != digest:
         raise Refusal(409, "idempotency", "this Idempotency-Key was used for another job; take a new one")
     return known
-
-
-def _loss(lost: dict[str, Any]) -> str:
-    """A shard that was given up, in words."""
-    first, last = lost["trials"]
-    return (
-        f"{lost['algorithm']}: trials {first} to {last} of seed {lost['seed']} are missing from all figures: "
-        f"given up after {lost['tries']} tries, {lost['reason']}"
-    )
 
 
 def _told(error: BaseException) -> dict[str, str]:

@@ -14,6 +14,8 @@ from server.artifacts import write_text
 from server.problems import Refusal
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
+#: Saved scenarios: every one of them is read for the list.
+MOST = 500
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class Shelf:
         """Keep a scenario under a name; whether it is a new one."""
         path = self._writable(name)
         new = not path.exists()
+        if new and sum(1 for _ in self.folder.glob("*.toml")) >= MOST:
+            raise Refusal(422, "scenarios", f"{MOST} scenarios are kept already; delete some")
         self.folder.mkdir(parents=True, exist_ok=True)
         write_text(path, toml.dumps(scenario))
         return new

@@ -17,6 +17,8 @@ MAX_UNKNOWN = 20
 
 #: What a vehicle, target or beacon may be called: it becomes part of key paths, array names and file columns.
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,39}$")]
+#: The name of an algorithm, a subject or a metric.
+Word = Annotated[str, Field(max_length=200)]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -77,21 +79,21 @@ class Interval(Table):
 class Than(Table):
     """Another metric to compare a claim's metric with."""
 
-    metric: str = Field(description="name of the metric, as in result.json")
-    algorithm: str = Field(description="algorithm it is of")
-    subject: str | None = Field(None, description="vehicle (or other subject) it is of")
+    metric: Word = Field(description="name of the metric, as in result.json")
+    algorithm: Word = Field(description="algorithm it is of")
+    subject: Word | None = Field(None, description="vehicle (or other subject) it is of")
     factor: float = Field(1.0, description="multiplies the other metric before comparing")
 
 
 class Claim(Table):
     """Something the source asserts, checked against the result by `coopnav check`."""
 
-    text: str = Field(description="the assertion in words")
-    metric: str = Field(description="metric of result.json, dotted where nested (packets.bytes_per_packet)")
-    algorithm: str = Field(description="algorithm it is of")
-    subject: str | None = Field(None, description="vehicle (or other subject) it is of")
+    text: str = Field(max_length=2000, description="the assertion in words")
+    metric: Word = Field(description="metric of result.json, dotted where nested (packets.bytes_per_packet)")
+    algorithm: Word = Field(description="algorithm it is of")
+    subject: Word | None = Field(None, description="vehicle (or other subject) it is of")
     operator: Literal["<", "<=", ">", ">=", "=="] = Field(description="how the metric compares")
-    bound: bool | int | float | str | None = Field(None, description="the value to compare with")
+    bound: bool | int | float | Word | None = Field(None, description="the value to compare with")
     than: Than | None = Field(None, description="the metric to compare with, instead of a bound")
 
     @model_validator(mode="after")
@@ -114,7 +116,7 @@ class ScenarioBase(Table):
     )
     seed: int = Field(1, ge=0, lt=2**63, description="of all random draws")
     trials: int = Field(1, ge=1, le=MAX_TRIALS, description="Monte Carlo trials")
-    algorithms: list[str] = Field([], max_length=64, description="estimators to compare")
+    algorithms: list[Word] = Field([], max_length=64, description="estimators to compare")
     options: dict[str, dict[str, Any]] = Field({}, max_length=64, description="settings of single algorithms, by name")
     claims: list[Claim] = Field([], max_length=200, description="assertions to check against the result")
     origin: str = Field("", exclude=True)

@@ -117,32 +117,32 @@ async def events(id: str, here: Here, last_event_id: Annotated[str, Header()] = 
 @router.get("/jobs/{id}/result", response_class=FileResponse)
 def result(id: str, here: Here) -> FileResponse:
     """result.json of a finished job."""
-    path = here.jobs.artifact(id, artifacts.RESULT)
+    path = here.jobs.results.artifact(id, artifacts.RESULT)
     return FileResponse(path, media_type="application/json", stat_result=path.stat())
 
 
 @router.get("/jobs/{id}/arrays", response_class=FileResponse)
 def arrays(id: str, here: Here) -> FileResponse:
     """arrays.npz of a finished job."""
-    path = here.jobs.artifact(id, artifacts.ARRAYS)
+    path = here.jobs.results.artifact(id, artifacts.ARRAYS)
     return FileResponse(path, media_type="application/octet-stream", filename=f"{id}-{artifacts.ARRAYS}")
 
 
 @router.get("/jobs/{id}/graphs/{algorithm}", response_class=FileResponse)
 def graphs(id: str, algorithm: str, here: Here) -> FileResponse:
     """Factor graphs and broadcasts of a finished job's first trial, of an algorithm whose view says it has them."""
-    written = artifacts.read_sums(here.jobs.artifact(id, artifacts.RESULT).parent)
+    written = artifacts.read_sums(here.jobs.results.artifact(id, artifacts.RESULT).parent)
     name = artifacts.graph_file(algorithm)
     if name not in written:
         raise Refusal(404, "no-graph", f"{algorithm!r} tells of no factor graph in this job")
-    return FileResponse(here.jobs.artifact(id, name), media_type="application/json")
+    return FileResponse(here.jobs.results.artifact(id, name), media_type="application/json")
 
 
 @router.get("/jobs/{id}/report", response_class=HTMLResponse)
 def job_report(id: str, here: Here) -> HTMLResponse:
     """A finished job as one HTML page that needs nothing else."""
-    here.jobs.artifact(id, artifacts.ARRAYS)
-    folder = here.jobs.artifact(id, artifacts.RESULT).parent
+    here.jobs.results.artifact(id, artifacts.ARRAYS)
+    folder = here.jobs.results.artifact(id, artifacts.RESULT).parent
     return HTMLResponse(report.of_directory(folder), headers={"content-security-policy": report.POLICY})
 
 
@@ -150,7 +150,7 @@ def job_report(id: str, here: Here) -> HTMLResponse:
 def view(id: str, here: Here) -> Response:
     """A run thinned for display, as far as it has come; 204 while there is nothing to see."""
     headers = {"cache-control": "no-store"}
-    text = here.jobs.view(id)
+    text = here.jobs.results.view(id)
     if text is None:
         return Response(status_code=204, headers=headers)
     return Response(text, media_type="application/json", headers=headers)

@@ -48,7 +48,7 @@ def table_1(runs: Runs, here: Here) -> list[dict[str, Any]]:
 
 def _result(here: Site, job: str, scenario: str) -> dict[str, Any]:
     """result.json of a job, which must be of that scenario and have the algorithms others are compared with."""
-    result = json.loads(here.jobs.artifact(job, artifacts.RESULT).read_text())
+    result = json.loads(here.jobs.results.artifact(job, artifacts.RESULT).read_text())
     if here.jobs.find(job).public()["scenario"] != scenario:
         raise Refusal(422, "wrong-run", f"job {job} is not a run of {scenario}")
     absent = [name for name in ("dead_reckoning", "cekf") if name not in result["algorithms"]]

@@ -200,7 +200,7 @@ class Session:
             if state != "done":
                 async for event in jobs.journal.follow(job, pause_s=1.0):
                     if self._footage is None:
-                        outline = await asyncio.to_thread(jobs.outline, job)
+                        outline = await asyncio.to_thread(jobs.results.outline, job)
                         if outline is not None:
                             await self._stage(footage(outline, names))
                     if self._footage is None or event is None or event.kind != "estimates":
@@ -210,7 +210,7 @@ class Session:
                         self._footage.tracks[news["algorithm"]].grow(news)
                         self._stale.set()
             if jobs.find(job).state == "done":
-                text = await asyncio.to_thread(jobs.view, job)
+                text = await asyncio.to_thread(jobs.results.view, job)
                 assert text is not None, "a job that is done has a view"
                 view = json.loads(text)
                 graphs = await asyncio.to_thread(_graphs, jobs, job, view)
@@ -254,7 +254,7 @@ class Session:
         assert self._footage is not None
         shown = {s: (self._footage.time_s, track) for s, track in self._footage.truth.items()}
         try:
-            path = self._sessions.jobs.artifact(self._job, artifacts.ARRAYS)
+            path = self._sessions.jobs.results.artifact(self._job, artifacts.ARRAYS)
             self._ensembles = await asyncio.to_thread(ensemble.read, path, list(self._footage.tracks), shown)
         except Refusal as refusal:
             self._ensembles = {}
@@ -315,7 +315,7 @@ def _graphs(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, dict[str, g
     found = {}
     for algorithm, told in view["algorithms"].items():
         if told.get("graph"):
-            path = jobs.artifact(job, artifacts.graph_file(algorithm))
+            path = jobs.results.artifact(job, artifacts.graph_file(algorithm))
             found[algorithm] = graph.read(json.loads(path.read_text(encoding="utf-8")), names)
     return found
 
@@ -326,7 +326,7 @@ def _pursuits(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, pursuit.P
     found = {}
     for algorithm, told in view["algorithms"].items():
         if told.get("schedule"):
-            path = jobs.artifact(job, artifacts.graph_file(algorithm))
+            path = jobs.results.artifact(job, artifacts.graph_file(algorithm))
             read = pursuit.read(json.loads(path.read_text(encoding="utf-8")), names)
             if read is not None:
                 found[algorithm] = read
@@ -338,7 +338,7 @@ def _sounds(jobs: Jobs, job: str, view: dict[str, Any]) -> dict[str, sound.Sound
     found = {}
     for algorithm, told in view["algorithms"].items():
         if told.get("sound"):
-            path = jobs.artifact(job, artifacts.graph_file(algorithm))
+            path = jobs.results.artifact(job, artifacts.graph_file(algorithm))
             found[algorithm] = sound.read(json.loads(path.read_text(encoding="utf-8")))
     return found
 

@@ -67,6 +67,7 @@ def zip_bomb() -> bytes:
 
 
 ZIP_BOMB = zip_bomb()
+CLAIM = json.dumps([{"text": "x" * MIB, "metric": "rmse_m", "algorithm": "cekf", "operator": "<", "bound": 1}])
 RECORDED = """{"scenario": {"schema": 1, "title": "x", "family": "navigation", "algorithms": ["cekf"],
 "mission": {"kind": "recorded", "format": "csv", "log": "%s",
 "odometry": [{"vehicle": "a", "file": "passwd.csv", "time": "t", "forward": "f", "turn": "w"}]},
@@ -116,6 +117,7 @@ ATTACKS = [
     ("TOML strings without an end", "PUT", "/api/scenarios/mine", TOML, '\\"""\n' * (MIB // 5), {422}),
     ("the same, on one line", "PUT", "/api/scenarios/mine", TOML, 'a = "' + '\\"' * (MIB // 2), {422}),
     ("the same as a value", "POST", "/api/jobs", JSON, with_set("seed", json.dumps('\\"' * (MIB // 4))), {422}),
+    ("a claim of a megabyte, told in every list of jobs", "POST", "/api/jobs", JSON, with_set("claims", CLAIM), {422}),
     ("a hundred thousand unknown keys", "PUT", "/api/scenarios/mine", TOML, UNKNOWN, {422}),
     ("a pickle as a scenario", "PUT", "/api/scenarios/mine", BINARY, pickle.dumps({}), {415, 422}),
     ("code named as an algorithm", "POST", "/api/jobs", JSON, with_algorithm("os:system"), {422}),

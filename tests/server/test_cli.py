@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import sqlite3
 from pathlib import Path
@@ -175,7 +176,14 @@ def test_an_unknown_command_is_told(capsys: pytest.CaptureFixture[str]):
         ["serve", "--port", "99999"],
         ["list", "vessels"],
         ["run", "first-look", "--workers", "0"],
+        ["run", "first-look", "--workers", "two"],
+        ["serve", "--port", "http"],
+        ["serve", "--keep-days", "nan"],
+        ["serve", "--keep-gb", "-1"],
     ):
         with pytest.raises(SystemExit) as end:
             main(command)
         assert end.value.code == 2
+        told = capsys.readouterr().err
+        assert not command or command[-1] in told
+        assert not re.search(r"\b_\w+|Traceback", told), "names of ours are nobody's business"

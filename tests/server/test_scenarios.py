@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from engine.scenario import library
+from server import shelf
 from tests.server.living import Live
+
+TOML = {"content-type": "application/toml"}
 
 
 def test_shipped_scenarios_are_listed_in_brief(live: Live):
@@ -27,6 +30,16 @@ def test_a_saved_scenario_comes_back_runs_and_goes(live: Live):
     assert live.http.delete("/api/scenarios/mine").status_code == 204
     assert live.http.get("/api/scenarios/mine").status_code == 404
     assert live.http.delete("/api/scenarios/mine").status_code == 404
+
+
+def test_saved_scenarios_are_limited_in_number(live: Live, monkeypatch):
+    text = live.http.get("/api/scenarios/first-look").json()["toml"]
+    kept = sum(1 for _ in (live.settings.data / "scenarios").glob("*.toml"))
+    monkeypatch.setattr(shelf, "MOST", kept + 1)
+    answers = [live.http.put(f"/api/scenarios/limit-{n}", content=text, headers=TOML) for n in (0, 1, 0)]
+    assert [a.status_code for a in answers] == [201, 422, 200]
+    assert "delete some" in answers[1].json()["detail"]
+    assert live.http.delete("/api/scenarios/limit-0").status_code == 204
 
 
 def test_an_edited_scenario_comes_as_json_and_toml_and_is_not_kept(live: Live):
