@@ -14,6 +14,8 @@ TLS=${COOPNAV_TLS:-$HOME/tls}
 KEYS=(--tls-ca-file "$TLS/ca.pem" --tls-cert "$TLS/node.pem" --tls-key "$TLS/node.key")
 PORT=$((20000 + SLURM_JOB_ID % 20000))
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+# Dask's web servers ask nobody who he is: they get nothing to say.
+export DASK_DISTRIBUTED__SCHEDULER__HTTP__ROUTES='[]' DASK_DISTRIBUTED__WORKER__HTTP__ROUTES='[]'
 
 "$BIN/dask" scheduler --protocol tls --port "$PORT" --no-dashboard "${KEYS[@]}" &
 trap 'kill $!' EXIT

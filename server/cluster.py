@@ -32,8 +32,8 @@ LOOK_S = 0.5
 GRACE_S = 0.6
 STOP_POLL_S = 0.1
 #: A worker that reaches its memory limit is ended, not slowed down. What Dask remembers for its own dashboard,
-#: estimates told by our runs among it, fills memory; nobody looks at it here. Its schedulers and workers have web servers
-#: that ask nobody who he is: they are left with nothing to say.
+#: estimates told by our runs among it, fills memory; nobody looks at it here. Its schedulers and workers have web
+#: servers that ask nobody who he is: they are left with nothing to say.
 PROCESSES = {
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],

@@ -250,11 +250,11 @@ def test_connections_too_many_are_told_and_hung_up_on_and_websockets_count(small
     where = urlsplit(small.url)
     with ExitStack() as crowd:
         for _ in range(3):
-            crowd.enter_context(connect(f"{small.ws}/api/scenes/session"))
+            crowd.enter_context(connect(f"{small.ws}/api/scenes/session", open_timeout=PATIENCE_S))
         for _ in range(3):
             crowd.enter_context(closing(socket.create_connection((where.hostname, where.port), PATIENCE_S)))
 
-        def refused() -> httpx.Response | None:
+        def refused() -> dict | None:
             wire = crowd.enter_context(closing(socket.create_connection((where.hostname, where.port), PATIENCE_S)))
             wire.sendall(b"GET /api/health/live HTTP/1.1\r\nhost: localhost\r\n\r\n")
             head, _, body = wire.recv(65536).partition(b"\r\n\r\n")

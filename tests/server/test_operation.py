@@ -63,9 +63,10 @@ def test_a_token_from_the_environment_is_used_and_not_printed(monkeypatch):
     monkeypatch.setenv(serving.TOKEN_VARIABLE, TOKEN)
     assert serving.given_token() == TOKEN
     assert TOKEN not in serving.address(Settings(data=Path(), token=TOKEN), shown=False)
-    monkeypatch.setenv(serving.TOKEN_VARIABLE, "short")
-    with pytest.raises(serving.CannotServe, match="at least"):
-        serving.given_token()
+    for token in ("short", "ü" * 20, "a token of\nmany words"):
+        monkeypatch.setenv(serving.TOKEN_VARIABLE, token)
+        with pytest.raises(serving.CannotServe, match="at least"):
+            serving.given_token()
 
 
 @pytest.mark.parametrize(
