@@ -42,6 +42,9 @@ const WAITING = {
   cancelled: "The run was cancelled before there were figures.",
 };
 
+/** More remarks than this are folded away. */
+const MOST_OPEN = 4;
+
 /** What a person has chosen to compare with, and in which figure; null is the usual. */
 const chosen = { baseline: null, figure: null };
 
@@ -58,7 +61,7 @@ export function mountTable() {
       comparison
         ? el("div", { class: "scroll-x", tabindex: 0, role: "region", "aria-label": "Comparison table" }, table(comparison))
         : el("p", { class: "quiet" }, WAITING[job.state] ?? "Reading the result…"),
-      ...notes(result, algorithms ?? []),
+      ...notes(result, algorithms ?? [], room.querySelector(".remarks")?.open),
     );
     if (focused) document.getElementById(focused)?.focus({ preventScroll: true });
     choose(store.state);
@@ -204,9 +207,12 @@ function difference({ difference: found }, { figure, title, baseline, trials }) 
 }
 
 /** What the estimators themselves remark: assumptions not met, ranges refused. */
-function notes(result, algorithms) {
+function notes(result, algorithms, open) {
   const remarks = Object.entries(result?.algorithms ?? {}).flatMap(([name, { notes }]) =>
     notes.map((text) => el("li", {}, el("b", {}, algorithms.find((a) => a.name === name)?.title ?? name), ` ${text}`)),
   );
-  return remarks.length ? [el("ul", { class: "remarks", "aria-label": "Remarks of the estimators" }, remarks)] : [];
+  if (!remarks.length) return [];
+  const list = el("ul", { "aria-label": "Remarks of the estimators" }, remarks);
+  const words = `${remarks.length} ${remarks.length === 1 ? "remark" : "remarks"} of the estimators`;
+  return [el("details", { class: "remarks", open: open ?? remarks.length <= MOST_OPEN }, el("summary", {}, words), list)];
 }

@@ -96,11 +96,14 @@ class Watch:
 
 
 @contextmanager
-def window(browser: Browser, server: Server, watch: Watch) -> Iterator[BrowserContext]:
-    """A browser window on the server, at the end of which nothing may have gone wrong in its pages."""
+def window(browser: Browser, server: Server, watch: Watch, **kind: Any) -> Iterator[BrowserContext]:
+    """A browser window on the server, at the end of which nothing may have gone wrong in its pages.
+
+    `kind` is what Playwright's contexts are given: viewport, has_touch, …
+    """
     toured = {"origin": server.url, "localStorage": [{"name": "coopnav.tour", "value": "seen"}]}
     before = {"cookies": [], "origins": [toured]}
-    context = browser.new_context(viewport=SIZE, base_url=server.url, storage_state=before)  # type: ignore[arg-type]
+    context = browser.new_context(**{"viewport": SIZE} | kind, base_url=server.url, storage_state=before)  # type: ignore[arg-type]
     context.set_default_timeout(30_000)
     watch.over(context)
     yield context
