@@ -45,6 +45,17 @@ def test_missions_can_be_chosen_by_keyboard(page: Page):
     expect(page.locator("#empty h1")).to_have_text(chosen)
 
 
+def test_estimators_that_can_be_compared_can_be_told_apart(page: Page):
+    """Also those of another family that fly the same missions: by colour and dash together, and by the dash alone."""
+    page.goto("/")
+    expect(page.get_by_role("radio", name="First look")).to_be_checked()
+    lines = page.locator("#algorithms .line-sample line")
+    styles = lines.evaluate_all("all => all.map(l => [l.getAttribute('stroke'), l.getAttribute('stroke-dasharray')])")
+    assert len(styles) > 8
+    assert len({tuple(style) for style in styles}) == len(styles)
+    assert len({dash for _, dash in styles}) == len(styles)
+
+
 def test_nothing_ticked_cannot_be_run(page: Page):
     page.goto("/")
     for name in THREE:
