@@ -307,10 +307,10 @@ class Jobs:
             await plan.settled.wait()
         async with self._assembling:
             lost = list(self.store.lost(job.id).values())
-            notes = await _to_the_end(self.results.assemble, job, scenario, lost)
+            notes, rmse_m = await _to_the_end(self.results.assemble, job, scenario, lost)
         for algorithm, (done, seconds) in plan.cost.items():
             await asyncio.to_thread(self.store.worked, algorithm, job.family, done, seconds)
-        await self._record(job.id, state="done", progress=1.0, finished_at=now(), notes=notes, lost=lost)
+        await self._record(job.id, state="done", progress=1.0, finished_at=now(), notes=notes, lost=lost, rmse_m=rmse_m)
         await asyncio.to_thread(self.results.drop_shards, job.id)
 
 

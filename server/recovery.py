@@ -87,7 +87,14 @@ def _adopt(store: Store, folders: Path) -> None:
         if there is None:
             store.add(job)
         elif there.state not in FINAL and job.state in FINAL:
-            store.change(job.id, state=job.state, finished_at=job.finished_at, error=job.error, notes=job.notes)
+            store.change(
+                job.id,
+                state=job.state,
+                finished_at=job.finished_at,
+                error=job.error,
+                notes=job.notes,
+                rmse_m=job.rmse_m,
+            )
 
 
 def _sweep(store: Store, folders: Path) -> None:

@@ -117,8 +117,13 @@ class Results:
         for path in (self.folders / id).glob("shard-*.npz"):
             path.unlink(missing_ok=True)
 
-    def assemble(self, job: Job, scenario: ScenarioBase, lost: Sequence[dict[str, Any]]) -> list[str]:
-        """Write the files of a finished job; what its algorithms, and shards given up, want to be known."""
+    def assemble(
+        self, job: Job, scenario: ScenarioBase, lost: Sequence[dict[str, Any]]
+    ) -> tuple[list[str], dict[str, dict[str, float]]]:
+        """Write the files of a finished job.
+
+        Returns what its algorithms, and shards given up, want to be known, and the algorithms' errors by subject.
+        """
         gaps = {entry["trials"][0] for entry in lost}
         parts = [part for part in self._parts(job) if part[0].trials[0] not in gaps]
         if not parts:
@@ -139,7 +144,8 @@ class Results:
             told = result.to_json()
         graphs = [artifacts.graph_file(name) for name, tracks in result.tracks.items() if tracks.graph]
         artifacts.write_sums(folder, [*FILES, *graphs])
-        return notes + [f"{name}: {note}" for name, answer in told["algorithms"].items() for note in answer["notes"]]
+        notes += [f"{name}: {note}" for name, answer in told["algorithms"].items() for note in answer["notes"]]
+        return notes, {name: _errors(answer["subjects"]) for name, answer in told["algorithms"].items()}
 
     def _totals(self, job: Job, parts: view.Parts) -> statistics.Totals:
         """What all trials left: those kept whole, and one batch after the other."""
@@ -153,6 +159,12 @@ class Results:
             whole = len(job.algorithms) if job.keep == "statistics" else math.inf
             return [artifacts.read_shard(self.shard_file(job.id, n)) for n in self.store.shards(job.id) if n < whole]
         return []
+
+
+def _errors(subjects: dict[str, dict[str, Any]]) -> dict[str, float]:
+    """RMS errors (m) by subject, of those that have one."""
+    errors = {name: metrics.get("rmse_m") for name, metrics in subjects.items()}
+    return {name: error for name, error in errors.items() if error is not None and math.isfinite(error)}
 
 
 def _loss(lost: dict[str, Any]) -> str:

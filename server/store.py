@@ -61,6 +61,9 @@ CREATE TABLE notes (key TEXT PRIMARY KEY, value TEXT NOT NULL)
     """
 ALTER TABLE jobs ADD COLUMN keep TEXT NOT NULL DEFAULT 'tracks'
 """,
+    """
+ALTER TABLE jobs ADD COLUMN rmse_m TEXT NOT NULL DEFAULT '{}'
+""",
 )
 VERSION = len(MIGRATIONS)
 
@@ -72,7 +75,8 @@ class Job:
     purpose is "run" or "what-if", which goes before others; limit_s bounds the time it may run; lost tells of the
     shards that were given up: {"algorithm", "trials", "seed", "tries", "reason"} each. tags and pinned are its owner's
     marks; changes are the values by key path that its scenario was given on submission. keep is "tracks", or
-    "statistics" where of most trials only figures over them are kept.
+    "statistics" where of most trials only figures over them are kept. rmse_m tells each algorithm's error by subject
+    once the job is done, where there was something to compare with.
     """
 
     id: str
@@ -101,6 +105,7 @@ class Job:
     tags: list[str] = field(default_factory=list)
     changes: dict[str, Any] = field(default_factory=dict)
     keep: str = "tracks"
+    rmse_m: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def public(self) -> dict[str, Any]:
         """The job as REST shows it."""
@@ -117,7 +122,7 @@ class Event:
     data: str
 
 
-_JSON = {"algorithms", "error", "notes", "lost", "tags", "changes"}
+_JSON = {"algorithms", "error", "notes", "lost", "tags", "changes", "rmse_m"}
 _FINAL = ",".join(f"'{state}'" for state in sorted(FINAL))
 _COLUMNS = [f.name for f in fields(Job)]
 

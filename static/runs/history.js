@@ -1,13 +1,13 @@
 // All runs in a table: to sort, filter, tag, pin, compare, run again and delete.
 
 import { el } from "../look/dom.js";
-import { ago, count, percent, plural } from "../look/format.js";
+import { NONE, ago, count, metres, percent, plural } from "../look/format.js";
 import { lineSample } from "../look/swatch.js";
 import { present, removeRuns, runAgain } from "../state/jobs.js";
 import { runLink } from "../state/link.js";
 import { store } from "../state/store.js";
 import { reportPath } from "../wire/api.js";
-import { KEYS, changesOf, matching, sorted, tagsOf } from "./order.js";
+import { KEYS, changesOf, errorOf, matching, sorted, tagsOf } from "./order.js";
 import { pinButton, tagEditor } from "./tags.js";
 
 const HEADS = [
@@ -15,6 +15,7 @@ const HEADS = [
   ["algorithms", "Estimators"],
   ["trials", "Trials"],
   ["seed", "Seed"],
+  ["error", "RMSE"],
   ["state", "State"],
   ["created_at", "Started"],
 ];
@@ -31,6 +32,7 @@ export function buildHistory() {
   const tag = el("select", { "aria-label": "Tag" });
   const whatIfs = el("input", { type: "checkbox", checked: true });
   const whatIfLabel = el("label", { class: "toggle" }, whatIfs, "what-ifs too");
+  const whose = el("select", { "aria-label": "Estimator of the errors", title: "Whose RMS error, over all that is located, the table tells" });
   const found = el("span", { class: "quiet-inline", role: "status" });
   const compare = el("button", { type: "button", class: "primary", id: "compare" });
   const remove = el("button", { type: "button", id: "delete-runs" }, "Delete");
@@ -65,7 +67,7 @@ export function buildHistory() {
   const root = el(
     "div",
     { class: "all-runs" },
-    el("div", { class: "room-tools" }, el("h1", {}, "Runs"), search, state, tag, whatIfLabel, found, el("span", { class: "spring" }), remove, compare),
+    el("div", { class: "room-tools" }, el("h1", {}, "Runs"), search, state, tag, whose, whatIfLabel, found, el("span", { class: "spring" }), remove, compare),
     known,
     el("div", { class: "scroll-x", tabindex: 0, role: "region", "aria-label": "Table of all runs" }, table),
     none,
@@ -78,7 +80,7 @@ export function buildHistory() {
 
   function shown() {
     const wanted = { text: search.value, state: state.value || null, tag: tag.value || null, whatIfs: whatIfs.checked };
-    return sorted(matching(present(store.state) ?? [], wanted), order);
+    return sorted(matching(present(store.state) ?? [], wanted), order, whose.value);
   }
 
   function draw() {
@@ -96,6 +98,7 @@ export function buildHistory() {
     tag.replaceChildren(el("option", { value: "" }, "Any tag"), ...tags.map((t) => el("option", { value: t }, t)));
     tag.value = wanted;
     tag.hidden = !tags.length;
+    offer(jobs);
     known.replaceChildren(...tags.map((t) => el("option", { value: t })));
     whatIfLabel.hidden = !jobs.some((job) => job.purpose === "what-if");
     for (const id of chosen) if (!jobs.some((job) => job.id === id)) chosen.delete(id);
@@ -108,6 +111,16 @@ export function buildHistory() {
     none.textContent = jobs.length ? "No run matches." : "No runs yet. Pick a mission in the workbench and press Run; every run is kept here.";
     table.hidden = !rows.length;
     tell();
+  }
+
+  /** The estimators that there are errors of. */
+  function offer(jobs) {
+    const names = new Set(jobs.flatMap((job) => Object.keys(job.rmse_m ?? {})));
+    const known = (store.state.algorithms ?? []).filter((a) => names.has(a.name));
+    const before = names.has(whose.value) ? whose.value : "";
+    whose.replaceChildren(el("option", { value: "" }, "Least error"), ...known.map((a) => el("option", { value: a.name }, `Error of ${a.title}`)));
+    whose.value = before;
+    whose.hidden = !known.length;
   }
 
   function refill(rows) {
@@ -168,6 +181,7 @@ export function buildHistory() {
       ),
       el("td", { class: "figure" }, count(job.trials)),
       el("td", { class: "figure" }, String(job.seed)),
+      errorCell(job),
       el("td", {}, el("span", { class: "state", "data-state": job.state }, job.state === "running" ? percent(job.progress ?? 0) : job.state)),
       el("td", { title: new Date(job.created_at).toLocaleString() }, ago(job.created_at)),
       el(
@@ -180,8 +194,15 @@ export function buildHistory() {
     );
   }
 
+  function errorCell(job) {
+    const least = errorOf(job, whose.value);
+    if (least === null) return el("td", { class: "figure" }, NONE);
+    const title = store.state.algorithms?.find((a) => a.name === least.algorithm)?.title ?? least.algorithm;
+    return el("td", { class: "figure error", title: `${title}, RMS over all it locates` }, whose.value ? null : lineSample(least.algorithm, store.state.algorithms ?? []), metres(least.error_m));
+  }
+
   search.addEventListener("input", draw);
-  for (const tool of [state, tag, whatIfs]) tool.addEventListener("change", draw);
+  for (const tool of [state, tag, whose, whatIfs]) tool.addEventListener("change", draw);
   all.addEventListener("change", () => {
     for (const job of shown()) {
       if (all.checked) chosen.add(job.id);

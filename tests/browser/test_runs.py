@@ -38,6 +38,20 @@ def test_runs_are_searched_sorted_and_tagged(page: Page, server: Server, solo: s
         seeds = [int(text) for text in page.locator(".history tbody td.figure:nth-of-type(5)").all_inner_texts()]
         assert seeds == sorted(seeds, reverse=direction == "descending")
 
+    errors = {
+        job["id"]: job["rmse_m"]["cekf"]
+        for job in server.get("/api/jobs")
+        if "cekf" in job["rmse_m"] and job["id"] in (solo, lossy)
+    }
+    page.get_by_label("Estimator of the errors").select_option(label="Error of Centralized EKF")
+    page.get_by_role("columnheader", name="RMSE").get_by_role("button").click()
+    for id, of in errors.items():
+        error = sum(e**2 for e in of.values()) / len(of)
+        expect(row(page, id).locator(".error")).to_have_text(re.compile(rf"{error**0.5:.3g}0* m$"))
+    shown = page.locator(".history tbody td.figure:nth-of-type(6)").all_inner_texts()
+    told = [float(text.split()[0]) for text in shown if text != "–"]
+    assert told == sorted(told) and shown[len(told) :] == ["–"] * (len(shown) - len(told))
+
     add = row(page, lossy).get_by_role("combobox", name=re.compile("Add a tag"))
     add.fill("bad weather")
     add.press("Enter")

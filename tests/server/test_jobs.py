@@ -21,6 +21,8 @@ def test_a_job_gives_the_numbers_of_the_engine_itself(live: Live):
     for name, answer in own.to_json()["algorithms"].items():
         assert told["algorithms"][name]["subjects"] == answer["subjects"]
         assert told["algorithms"][name]["packets"] == answer["packets"]
+        errors = {subject: metrics["rmse_m"] for subject, metrics in answer["subjects"].items()}
+        assert live.job(job["id"])["rmse_m"][name] == errors
     with np.load(io.BytesIO(live.http.get(f"/api/jobs/{job['id']}/arrays").content)) as arrays:
         expected = own.arrays()
         assert set(arrays.files) == set(expected)
