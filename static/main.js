@@ -31,6 +31,7 @@ import { SceneSession } from "./wire/scenes.js";
 import { mountClaims } from "./workbench/claims.js";
 import { mountHeadline } from "./workbench/headline.js";
 import { mountPanes } from "./workbench/panes.js";
+import { mountPass } from "./workbench/pass.js";
 import { mountPlots } from "./workbench/plots.js";
 import { mountTable } from "./workbench/table.js";
 import { mountTimeline } from "./workbench/timeline.js";
@@ -50,6 +51,7 @@ mountPreview();
 mountExplorer();
 mountStudies();
 mountHeadline();
+mountPass();
 
 const panes = mountPanes(listenKeys);
 const session = new SceneSession({

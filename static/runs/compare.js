@@ -3,6 +3,7 @@
 import { el, svg } from "../look/dom.js";
 import { NONE, number, percent, plural } from "../look/format.js";
 import { darkScheme, lineStyle, vehicleColour } from "../look/palette.js";
+import { save as saveFile } from "../look/save.js";
 import { dot } from "../look/swatch.js";
 import { persist } from "../state/connection.js";
 import { roomLink, runLink } from "../state/link.js";
@@ -189,10 +190,7 @@ export function buildComparison() {
   save.addEventListener("click", () => {
     const wanted = FIGURES.find(({ key }) => key === figure.value);
     const lines = rowsOf(wanted, runs.map((r) => r.result), baseline()).map(({ algorithm, subject, cells }) => [algorithm, subject, ...cells.map((c) => c.value)]);
-    const text = csv([["algorithm", "subject", ...runs.map(({ job }) => `${wanted.key} ${job.id}`)], ...lines]);
-    const address = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
-    el("a", { href: address, download: `comparison-${wanted.key}.csv` }).click();
-    URL.revokeObjectURL(address);
+    saveFile(csv([["algorithm", "subject", ...runs.map(({ job }) => `${wanted.key} ${job.id}`)], ...lines]), `comparison-${wanted.key}.csv`, "text/csv");
   });
   subject.addEventListener("change", plot);
   logarithmic.addEventListener("change", plot);

@@ -30,6 +30,12 @@ export function noteLink() {
   }, PAUSE_MS);
 }
 
+/** The whole address of what is shown now. */
+export function addressNow() {
+  put(current());
+  return location.href;
+}
+
 /** The address of a run, as `href` takes it; `parts` may say {t, vehicle, …}. */
 export function runLink(id, parts = {}) {
   const said = Object.entries(parts).filter(([, value]) => value !== null && value !== undefined);

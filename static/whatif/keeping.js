@@ -1,6 +1,7 @@
 // To keep an edited mission: saved under a name, written to a file, read from one.
 
 import { el } from "../look/dom.js";
+import { save as saveFile } from "../look/save.js";
 import { readMissions, pickMission } from "../state/library.js";
 import { persist } from "../state/connection.js";
 import { store } from "../state/store.js";
@@ -70,9 +71,7 @@ export function keeping() {
   function download() {
     trying(async () => {
       const { toml } = await current();
-      const address = URL.createObjectURL(new Blob([toml], { type: "application/toml" }));
-      el("a", { href: address, download: `${store.state.mission}.toml` }).click();
-      setTimeout(() => URL.revokeObjectURL(address), 10_000);
+      saveFile(toml, `${store.state.mission}.toml`, "application/toml");
     });
   }
 

@@ -65,11 +65,13 @@ export const removeLog = (log) => request(`/api/logs/${encodeURIComponent(log)}`
 export const jobs = () => request("/api/jobs");
 export const findJob = (id, signal) => request(job(id), { signal });
 export const view = (id, signal) => request(`${job(id)}/view`, { signal });
-export const result = (id, signal) => request(`${job(id)}/result`, { signal });
+export const result = (id, signal) => request(resultPath(id), { signal });
 export const cancel = (id) => request(`${job(id)}/cancel`, { method: "POST" });
 export const remove = (id) => request(job(id), { method: "DELETE" });
 export const mark = (id, marks) => request(job(id), { method: "PATCH", body: marks });
 export const ranScenario = (id, signal) => request(`${job(id)}/scenario`, { signal });
+export const resultPath = (id) => `${job(id)}/result`;
+export const arraysPath = (id) => `${job(id)}/arrays`;
 export const reportPath = (id) => `${job(id)}/report`;
 export const analyseTracking = (body, signal) => request("/api/tracking/analysis", { method: "POST", body, signal });
 export const trackingRegions = (body) => request("/api/tracking/regions", { method: "POST", body });

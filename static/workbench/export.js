@@ -1,6 +1,7 @@
 // A plot as a file: picture, drawing or numbers of what is shown.
 
 import { loadPlotly, token } from "../look/plotly.js";
+import { save } from "../look/save.js";
 import { csv } from "../runs/differences.js";
 import { figureOf } from "./figure.js";
 
@@ -12,11 +13,7 @@ const TYPES = { png: "image/png", svg: "image/svg+xml", csv: "text/csv" };
  */
 export async function savePlot(format, shown) {
   const content = format === "csv" ? csv(numbers(shown)) : await picture(format, shown);
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([content], { type: TYPES[format] }));
-  link.download = `${shown.name}.${format}`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+  save(content, `${shown.name}.${format}`, TYPES[format]);
 }
 
 async function picture(format, shown) {

@@ -2,6 +2,7 @@
 
 import { el, part, say } from "../look/dom.js";
 import { clockTime } from "../look/format.js";
+import { close, menu } from "../look/menu.js";
 import { loadPlotly } from "../look/plotly.js";
 import { sample } from "../look/swatch.js";
 import { clock } from "../state/clock.js";
@@ -27,9 +28,8 @@ export function buildPlot(quantity, settings, changed) {
   const whose = el("span", { class: "whose" });
   const how = el("span", { class: "how" });
   const log = el("button", { type: "button", class: "small log", title: "Logarithmic axis", onclick: () => turn() }, "log");
-  const menu = el(
-    "details",
-    { class: "menu" },
+  const keep = menu(
+    "menu",
     el("summary", { "aria-label": `Save ${quantity.title}` }, "Save"),
     el("div", { class: "choices" }, ["PNG", "SVG", "CSV"].map((format) => el("button", { type: "button", class: "small", onclick: () => save(format.toLowerCase()) }, format))),
   );
@@ -40,7 +40,7 @@ export function buildPlot(quantity, settings, changed) {
   const brush = el("div", { class: "brush", "aria-hidden": "true", hidden: true });
   const empty = el("p", { class: "quiet" });
   const canvas = el("div", { class: "canvas", title: "Click: go there. Drag: zoom. Double click: all of it." }, drawing, cursor, probe, brush, empty);
-  const head = el("div", { class: "head" }, el("span", { class: "name", title: quantity.about }, quantity.title), whose, how, log, menu);
+  const head = el("div", { class: "head" }, el("span", { class: "name", title: quantity.about }, quantity.title), whose, how, log, keep);
   const root = el("figure", { class: "plot", "data-quantity": quantity.key }, el("figcaption", {}, head, legend), canvas);
 
   let shown = { curves: [], bounds: null };
@@ -68,8 +68,7 @@ export function buildPlot(quantity, settings, changed) {
   }
 
   async function save(format) {
-    menu.open = false;
-    menu.firstChild.focus();
+    close(keep);
     await savePlot(format, plotted());
   }
 
@@ -81,7 +80,7 @@ export function buildPlot(quantity, settings, changed) {
     say(how, shown.how);
     log.hidden = Boolean(quantity.linear);
     log.setAttribute("aria-pressed", String(settings.log.has(quantity.key)));
-    menu.hidden = !shown.curves.length;
+    keep.hidden = !shown.curves.length;
     empty.hidden = shown.curves.length > 0;
     const none = state.view && state.hidden.algorithms.size ? "Nothing of what is shown has this." : "There is none of this vehicle.";
     empty.textContent = (state.job?.state === "done" || state.view ? none : NOTHING[state.job?.state]) ?? "";

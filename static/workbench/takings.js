@@ -2,11 +2,13 @@
 
 import { el } from "../look/dom.js";
 import { percent } from "../look/format.js";
+import { save } from "../look/save.js";
 import { paneState } from "../state/panes.js";
 import { store } from "../state/store.js";
 import { canFilm, film } from "./film.js";
 import { compose } from "./picture.js";
 
+const name = (ending) => `${store.state.job?.scenario ?? "run"}.${ending}`;
 const SECONDS = [6, 12, 30];
 
 /** The controls, for the scenes of a session and the panes that show them. */
@@ -24,7 +26,7 @@ export function takings(session, panes) {
     const seen = panes.shown();
     if (!seen.length) return void (word.textContent = "There is nothing to be seen yet.");
     word.textContent = "";
-    compose(document.createElement("canvas"), seen).toBlob((blob) => save(blob, "png"));
+    compose(document.createElement("canvas"), seen).toBlob((blob) => save(blob, name("png")));
   }
 
   async function shoot(kind) {
@@ -34,7 +36,7 @@ export function takings(session, panes) {
     try {
       const blob = await film(kind, Number(seconds.value), session, panes, { tell: (share) => (word.textContent = `Filming, ${percent(share)}`), signal: filming.signal });
       word.textContent = blob ? "The film is saved." : "";
-      if (blob) save(blob, "webm");
+      if (blob) save(blob, name("webm"));
     } finally {
       filming = null;
       busy(false);
@@ -50,10 +52,4 @@ export function takings(session, panes) {
   busy(false);
   paneState.watch(["layout"], ({ layout }) => (turn.hidden = layout === "plan"));
   return el("div", { class: "takings" }, picture, el("div", { class: "films" }, time, turn, seconds), stop, canFilm ? word : el("span", { class: "word" }, "This browser records no films."));
-}
-
-function save(blob, ending) {
-  const address = URL.createObjectURL(blob);
-  el("a", { href: address, download: `${store.state.job?.scenario ?? "run"}.${ending}` }).click();
-  setTimeout(() => URL.revokeObjectURL(address), 10_000);
 }

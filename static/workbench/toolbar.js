@@ -1,6 +1,7 @@
 // Above the panes: whose curves to read, what the panes draw and how, pictures and films of them.
 
 import { el, part } from "../look/dom.js";
+import { menu } from "../look/menu.js";
 import { darkScheme, lineStyle, vehicleColour } from "../look/palette.js";
 import { dot } from "../look/swatch.js";
 import { schedulers } from "../pursuit/story.js";
@@ -40,9 +41,8 @@ export function mountToolbar(session, panes) {
   const depth = select("Depths stretched", DEPTHS, (value) => paneState.set({ depth: Number(value) }));
   for (const option of layout.options) option.disabled = !hasWebGL && option.value !== "plan";
   const row = (label, node, hint) => el("label", { class: "choice", title: hint }, el("span", {}, label), node);
-  const menu = el(
-    "details",
-    { class: "view-menu" },
+  const more = menu(
+    "view-menu",
     el("summary", {}, "View"),
     el(
       "div",
@@ -53,13 +53,11 @@ export function mountToolbar(session, panes) {
       takings(session, panes),
     ),
   );
-  menu.addEventListener("keydown", (event) => event.key === "Escape" && ((menu.open = false), menu.firstChild.focus()));
-  document.addEventListener("pointerdown", (event) => !menu.contains(event.target) && (menu.open = false));
   const size = el("span", {});
   part("toolbar").append(
     vehicles,
     key(size),
-    el("div", { class: "toggles", role: "group", "aria-label": "Panes show" }, Object.entries(TOGGLES).map(toggle), layout, menu),
+    el("div", { class: "toggles", role: "group", "aria-label": "Panes show" }, Object.entries(TOGGLES).map(toggle), layout, more),
   );
 
   const tell = () => {

@@ -12,6 +12,7 @@ from typing import Any
 
 import httpx
 import pytest
+from playwright.sync_api import Page, Route
 
 PATIENCE_S = 60.0
 
@@ -25,6 +26,28 @@ def until(true: Callable[[], Any], what: str, patience_s: float = PATIENCE_S) ->
             return found
         time.sleep(0.05)
     pytest.fail(f"waited {patience_s:.0f} s in vain for {what}")
+
+
+def held(page: Page, url: str) -> Callable[[], None]:
+    """Requests for a URL wait from now on, until the function that is returned is called."""
+    waiting: list[Route] = []
+    holding = True
+
+    def hold(route: Route) -> None:
+        if holding:
+            waiting.append(route)
+        else:
+            route.continue_()
+
+    def release() -> None:
+        nonlocal holding
+        until(lambda: page.evaluate("1") and waiting, f"a request for {url}")
+        holding = False
+        for route in waiting:
+            route.continue_()
+
+    page.route(url, hold)
+    return release
 
 
 @dataclass

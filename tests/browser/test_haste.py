@@ -2,33 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from playwright.sync_api import Page, expect
 
-from playwright.sync_api import Page, Route, expect
-
-from tests.browser.serving import until
-
-
-def held(page: Page, url: str) -> Callable[[], None]:
-    """Requests for a URL wait from now on, until the function that is returned is called."""
-    waiting: list[Route] = []
-    holding = True
-
-    def hold(route: Route) -> None:
-        if holding:
-            waiting.append(route)
-        else:
-            route.continue_()
-
-    def release() -> None:
-        nonlocal holding
-        until(lambda: page.evaluate("1") and waiting, f"a request for {url}")
-        holding = False
-        for route in waiting:
-            route.continue_()
-
-    page.route(url, hold)
-    return release
+from tests.browser.serving import held
 
 
 def test_what_is_typed_before_the_library_is_read_stays(page: Page):

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Page, expect
 
-from tests.browser.eyes import count, difference, pixels, see_the_vehicles
+from tests.browser.eyes import count, difference, pixels, see_the_vehicles, settled
 from tests.browser.serving import Server, until
 
 BLUE, ORANGE = (0, 114, 178), (213, 94, 0)
@@ -24,7 +24,7 @@ def many(server: Server) -> str:
 
 
 def view(page: Page) -> None:
-    page.locator(".view-menu summary").click()
+    page.locator("#toolbar .view-menu summary").click()
 
 
 def plan(page: Page, algorithm: str) -> np.ndarray:
@@ -83,8 +83,7 @@ def test_ellipses_grow_with_their_sigma_and_trials_make_a_cloud(page: Page, many
     inked = {}
     for sigma in ("1 σ", "3 σ"):
         sizes.select_option(sigma)
-        until(lambda: difference(pixels(page, "dead_reckoning"), pixels(page, "dead_reckoning")) == 0, "a still pane")
-        inked[sigma] = pixels(page, "dead_reckoning")
+        inked[sigma] = settled(page, "dead_reckoning")
     until(lambda: difference(inked["1 σ"], pixels(page, "dead_reckoning")) > 0.001, "larger ellipses")
     expect(page.locator("#toolbar .keys")).to_contain_text("3 σ")
     before = pixels(page, "dead_reckoning")
@@ -98,7 +97,7 @@ def test_ellipses_grow_with_their_sigma_and_trials_make_a_cloud(page: Page, many
 def test_depths_are_stretched_as_asked(page: Page, many: str):
     page.goto(f"/#run={many}")
     see_the_vehicles(page, ["cekf"])
-    before = pixels(page, "cekf")
+    before = settled(page, "cekf")
     view(page)
     page.get_by_label("Depths stretched").select_option("× 20")
     page.keyboard.press("Escape")
@@ -142,7 +141,7 @@ def test_free_cameras_turn_one_pane_alone(page: Page, many: str):
     view(page)
     page.get_by_label("Cameras linked").uncheck()
     page.keyboard.press("Escape")
-    before = {name: pixels(page, name) for name in names}
+    before = {name: settled(page, name) for name in names}
     box = page.locator(".pane[data-algorithm=dead_reckoning] .view").bounding_box()
     assert box
 
@@ -156,3 +155,36 @@ def test_free_cameras_turn_one_pane_alone(page: Page, many: str):
     until(dragged, "the pane to turn")
     expect(page).to_have_url(re.compile("camera="))
     assert difference(before["cekf"], pixels(page, "cekf")) < 0.005, "the other stays"
+
+
+def test_a_vehicle_is_followed(page: Page, many: str):
+    page.goto(f"/#run={many}")
+    see_the_vehicles(page, ["cekf"])
+    for box in ("Trails", "Ellipses", "Rays"):
+        page.get_by_role("checkbox", name=box, exact=True).uncheck()
+    page.get_by_label("From above").check()
+    page.get_by_label("Follow").check()
+
+    def middle() -> bool:
+        """The scout's marks are about the middle of the pane."""
+        image = settled(page, "cekf")
+        height, width, _ = image.shape
+        about = image[height // 2 - 40 : height // 2 + 40, width // 2 - 60 : width // 2 + 60]
+        return count(about, BLUE) >= 15
+
+    for share in ("Home", "End"):
+        page.locator("#stage").focus()
+        page.keyboard.press(share)
+        until(middle, f"the scout in the middle at {share}")
+
+
+def test_six_panes_are_the_most_and_a_hidden_one_makes_room(page: Page, server: Server):
+    seven = ["dead_reckoning", "cekf", "nekf", "interleaved_update", "deif", "mdeif", "k_last"]
+    run = server.finished({"scenario": "first-look", "trials": 1, "algorithms": seven})
+    page.goto(f"/#run={run}&layout=plan")
+    expect(page.locator(".pane[data-state=shown]")).to_have_count(6)
+    expect(page.locator("#panes .note")).to_contain_text("1 more estimator")
+    page.locator(".chip[data-name=nekf]").click()
+    expect(page.locator(".pane[data-algorithm=k_last][data-state=shown]")).to_be_visible()
+    expect(page.locator(".pane")).to_have_count(6)
+    expect(page.locator("#panes .note")).to_be_hidden()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, Route, expect
 
 from tests.browser.conftest import SIZE, SOLO, Watch
 from tests.browser.eyes import difference, pixels, see_the_vehicles, settled
-from tests.browser.serving import Server, until
+from tests.browser.serving import Server, held, until
 
 
 def test_bad_input_names_its_key(page: Page, server: Server, watch: Watch, keep):
@@ -63,6 +64,37 @@ def test_a_run_that_is_gone_is_said_to_be_gone(page: Page, watch: Watch):
     page.goto("/#run=nosuchrun")
     expect(page.locator("#notices")).to_contain_text("This run does not exist")
     expect(page.locator("#empty")).to_be_visible()
+
+
+def test_a_run_that_failed_says_why(page: Page, server: Server, solo: str):
+    job = server.get(f"/api/jobs/{solo}")
+    job |= {"state": "failed", "error": {"title": "The run failed", "detail": "cekf left no estimate"}}
+    page.route(f"**/api/jobs/{solo}", lambda route: route.fulfill(json=job))
+    page.route(
+        f"**/api/jobs/{solo}/events",
+        lambda route: route.fulfill(
+            body=f"id: 1\nevent: state\ndata: {json.dumps(job)}\n\n", content_type="text/event-stream"
+        ),
+    )
+    page.goto(f"/#run={solo}")
+    expect(page.locator("#notices")).to_contain_text("The run failed")
+    expect(page.locator("#notices")).to_contain_text("cekf left no estimate")
+    expect(page.locator("#headline .state")).to_have_text("failed")
+    expect(page.locator(".pane .veil")).to_have_text("No estimates were made.")
+    expect(page.locator("#table")).to_contain_text("The run failed before there were figures.")
+
+
+def test_where_there_is_nothing_yet_the_page_says_what_to_do(page: Page):
+    page.route("**/api/jobs", lambda route: route.fulfill(json=[]))
+    release = held(page, "**/api/scenarios")
+    page.goto("/")
+    expect(page.locator("#empty")).to_have_text("Reading the library…")
+    page.get_by_role("tab", name="Runs").click()
+    expect(page.locator("#panel-runs")).to_contain_text("No runs yet")
+    release()
+    expect(page.get_by_role("heading", name="First look")).to_be_visible()
+    page.get_by_role("link", name="Runs", exact=True).click()
+    expect(page.locator("#runs-room")).to_contain_text("Pick a mission in the workbench and press Run")
 
 
 def test_a_broken_event_stream_goes_on_where_it_stopped(page: Page, server: Server):
