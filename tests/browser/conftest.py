@@ -27,7 +27,7 @@ FLAGS = [
     "--disable-background-networking",
 ]
 # On a machine that is busy a page takes its time.
-expect.set_options(timeout=30_000)
+expect.set_options(timeout=120_000)
 SIZE = {"width": 1280, "height": 720}
 #: A mission with two vehicles that takes a second or two.
 FIRST_LOOK = {"scenario": "first-look", "trials": 3, "algorithms": ["dead_reckoning", "cekf", "nekf"]}
@@ -104,7 +104,7 @@ def window(browser: Browser, server: Server, watch: Watch, **kind: Any) -> Itera
     toured = {"origin": server.url, "localStorage": [{"name": "coopnav.tour", "value": "seen"}]}
     before = {"cookies": [], "origins": [toured]}
     context = browser.new_context(**{"viewport": SIZE} | kind, base_url=server.url, storage_state=before)  # type: ignore[arg-type]
-    context.set_default_timeout(30_000)
+    context.set_default_timeout(60_000)
     watch.over(context)
     yield context
     context.close()

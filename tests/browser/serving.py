@@ -14,7 +14,7 @@ import httpx
 import pytest
 from playwright.sync_api import Page, Route
 
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0
 
 
 def until(true: Callable[[], Any], what: str, patience_s: float = PATIENCE_S) -> Any:
@@ -83,13 +83,13 @@ class Server:
 
     def get(self, path: str) -> Any:
         try:
-            return httpx.get(self.url + path, timeout=20).json()
+            return httpx.get(self.url + path, timeout=60).json()
         except httpx.TransportError:
             return {}
 
     def finished(self, body: dict[str, Any]) -> str:
         """Id of a job that was submitted and is done."""
-        answer = httpx.post(f"{self.url}/api/jobs", json=body, timeout=20)
+        answer = httpx.post(f"{self.url}/api/jobs", json=body, timeout=60)
         assert answer.status_code == 202, answer.text
         id = answer.json()["id"]
         until(lambda: self.get(f"/api/jobs/{id}").get("state") == "done", "a job to finish")

@@ -60,7 +60,7 @@ def test_ticks_made_while_a_run_is_accepted_are_for_the_next(page: Page):
     page.locator("input[value=nekf]").uncheck()
     page.locator("input[value=mdeif]").check()
     release()
-    expect(page.locator("#headline .state")).to_have_attribute("data-state", "done", timeout=60_000)
+    expect(page.locator("#headline .state")).to_have_attribute("data-state", "done")
     expect(page.locator(".pane")).to_have_count(3)
     expect(page.locator("input[value=nekf]")).not_to_be_checked()
     expect(page.locator("input[value=mdeif]")).to_be_checked()

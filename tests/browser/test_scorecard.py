@@ -17,7 +17,7 @@ def test_a_papers_claims_are_measured_and_lead_to_their_moment(page: Page, serve
     page.get_by_role("link", name="Claims", exact=True).click()
     paper = page.get_by_role("region", name=PAPER)
     paper.get_by_role("button", name=f"Measure the claims of {PAPER}").click()
-    expect(paper.locator("h2 + .score")).to_have_text(re.compile(rf"\d of {len(claims)} hold$"), timeout=60_000)
+    expect(paper.locator("h2 + .score")).to_have_text(re.compile(rf"\d of {len(claims)} hold$"))
     mission = paper.locator("details[data-mission=first-look]")
     mission.locator("summary").click()
     expect(mission.locator("li")).to_have_count(len(claims))

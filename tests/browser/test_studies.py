@@ -13,7 +13,7 @@ def test_a_loss_study_draws_each_estimator_against_loss(page: Page, keep):
     study = page.locator(".study", has=page.get_by_role("heading", name="Loss study"))
     study.get_by_role("button", name="Run the loss study").click()
     expect(study.get_by_role("button", name="Stop")).to_be_visible()
-    expect(study.locator("p[role=status]")).to_contain_text("3 losses", timeout=60_000)
+    expect(study.locator("p[role=status]")).to_contain_text("3 losses")
     for plot in study.locator("figure").all():
         expect(plot.locator(".scatterlayer .trace")).to_have_count(3)
     expect(page.locator("#runs-count")).to_have_text(re.compile(r"[3-9]|\d\d"))
@@ -24,9 +24,9 @@ def test_a_loss_study_can_be_stopped_and_keeps_what_was_finished(page: Page):
     page.goto("/")
     study = page.locator(".study", has=page.get_by_role("heading", name="Loss study"))
     study.get_by_role("button", name="Run the loss study").click()
-    expect(study.locator("figure .scatterlayer .trace").first).to_be_attached(timeout=60_000)
+    expect(study.locator("figure .scatterlayer .trace").first).to_be_attached()
     study.get_by_role("button", name="Stop").click()
-    expect(study.locator("p[role=status]")).to_contain_text("Stopped", timeout=30_000)
+    expect(study.locator("p[role=status]")).to_contain_text("Stopped")
     expect(study.get_by_role("button", name="Run the loss study")).to_be_visible()
 
 
@@ -71,6 +71,6 @@ def test_a_tracking_run_has_its_panes_and_its_view_below(page: Page):
     page.locator("label[data-name=rui-chitre-steady-safe]").click()
     page.locator("#field-trials").fill("50")
     page.get_by_role("button", name="Run", exact=True).click()
-    expect(page.locator("#headline .state")).to_have_text("finished", timeout=60_000)
+    expect(page.locator("#headline .state")).to_have_text("finished")
     expect(page.locator("#table tbody tr").first).to_be_visible()
     expect(page.locator("#explorer")).to_be_visible()

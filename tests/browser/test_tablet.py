@@ -53,7 +53,7 @@ def test_a_run_is_made_and_looked_at_by_touch(tablet: Page):
     tablet.locator("#field-trials").tap()
     tablet.locator("#field-trials").fill("2")
     tablet.locator("#run").tap()
-    expect(tablet.locator("#headline .state")).to_have_attribute("data-state", "done", timeout=60_000)
+    expect(tablet.locator("#headline .state")).to_have_attribute("data-state", "done")
     expect(tablet.locator("#table tbody tr").nth(5)).to_be_attached()
     tablet.locator(".chip[data-name=nekf]").tap()
     expect(tablet.locator(".pane[data-algorithm=nekf]")).to_be_hidden()

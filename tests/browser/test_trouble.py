@@ -39,7 +39,7 @@ def test_packet_loss_can_be_overridden(page: Page, server: Server):
     page.locator("#field-trials").fill("1")
     page.locator("[id='field-network.loss']").fill("1")
     page.locator("#run").click()
-    expect(page.locator("#headline .state")).to_have_attribute("data-state", "done", timeout=60_000)
+    expect(page.locator("#headline .state")).to_have_attribute("data-state", "done")
     expect(page.locator(".lane-keys")).to_contain_text("0 heard")
 
 
@@ -112,7 +112,7 @@ def test_a_broken_event_stream_goes_on_where_it_stopped(page: Page, server: Serv
     page.route("**/events", breaking)
     page.goto("/")
     page.locator("#run").click()
-    expect(page.locator("#headline .state")).to_have_attribute("data-state", "done", timeout=60_000)
+    expect(page.locator("#headline .state")).to_have_attribute("data-state", "done")
     assert asked[:2] == [None, "1"]
 
 
@@ -182,11 +182,11 @@ def test_a_lost_server_is_told_and_found_again(browser: Browser, tmp_path: Path,
         lost = page.get_by_role("alert").filter(has_text="does not answer")
         expect(lost).to_be_hidden()
         server.stop()
-        expect(lost).to_be_visible(timeout=20_000)
+        expect(lost).to_be_visible()
         expect(page.locator("#table tbody tr")).to_have_count(2)
         keep(page)
         server.start()
-        expect(lost).to_be_hidden(timeout=20_000)
+        expect(lost).to_be_hidden()
         scene = page.locator(".pane[data-algorithm=cekf] iframe")
         until(lambda: httpx.get(server.url + str(scene.get_attribute("src"))).status_code == 200, "new scenes")
         see_the_vehicles(page, ["cekf"])

@@ -59,7 +59,7 @@ def test_a_log_is_understood_saved_and_run(page: Page, dialog, log: dict[str, Pa
     expect(dialog).to_be_hidden()
     expect(page.locator(".mission[data-name=harbour-trial-3-may] input")).to_be_checked()
     page.get_by_role("button", name="Run", exact=True).click()
-    expect(page.locator("#headline .state")).to_have_attribute("data-state", "done", timeout=60_000)
+    expect(page.locator("#headline .state")).to_have_attribute("data-state", "done")
     expect(page.locator("#table tbody[data-algorithm=cekf] tr[data-subject=vehicle]")).to_be_visible()
     assert server.get("/api/logs")[-1]["used_by"] == ["harbour-trial-3-may"]
 

@@ -34,7 +34,7 @@ def enter(page: Page, name: str, text: str) -> None:
 
 
 def flown(page: Page) -> None:
-    expect(page.locator("#panel-whatif[data-state=shown]")).to_be_visible(timeout=60_000)
+    expect(page.locator("#panel-whatif[data-state=shown]")).to_be_visible()
 
 
 def drag(page: Page, name: str, shares: list[float]) -> None:
