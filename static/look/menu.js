@@ -10,7 +10,14 @@ export function menu(kind, button, sheet) {
     event.stopPropagation();
     close(root);
   });
-  document.addEventListener("pointerdown", (event) => !root.contains(event.target) && (root.open = false));
+  const elsewhere = (event) => {
+    if (!root.contains(event.target)) root.open = false;
+  };
+  // Only while it is open: the document would keep a menu that has left the page.
+  root.addEventListener("toggle", () => {
+    if (root.open) document.addEventListener("pointerdown", elsewhere);
+    else document.removeEventListener("pointerdown", elsewhere);
+  });
   return root;
 }
 
