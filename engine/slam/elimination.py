@@ -76,4 +76,4 @@ def _minimum_degree(free: Sequence[str], scopes: Iterable[Iterable[str]]) -> lis
     adjacency.data[:] = 1.0
     dominant = csc_array(adjacency + (n + 1) * eye_array(n, format="csc"))
     found = splu(dominant, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).perm_c
-    return [free[i] for i in np.argsort(found).tolist()]
+    return [free[int(i)] for i in np.argsort(found)]
