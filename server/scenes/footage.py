@@ -12,20 +12,26 @@ from server.scenes.pursuit import Pursuit
 from server.scenes.sound import Sound
 
 
-@dataclass
+@dataclass(frozen=True)
 class Track:
-    """One algorithm's estimates of trial 0: time_s (n,), mean {S: (n, 2)} m, cov {S: (n, 3)} m^2 (xx xy yy)."""
+    """One algorithm's estimates of trial 0: time_s (n,), mean {S: (n, 2)} m, cov {S: (n, 3)} m^2 (xx xy yy).
+
+    It stays as it is, for panes are drawn in other threads while estimates arrive; `grown` is another.
+    """
 
     time_s: np.ndarray = field(default_factory=lambda: np.zeros(0))
     mean: dict[str, np.ndarray] = field(default_factory=dict)
     cov: dict[str, np.ndarray] = field(default_factory=dict)
 
-    def grow(self, news: dict[str, Any]) -> None:
-        """Append an `estimates` event."""
-        self.time_s = np.concatenate([self.time_s, numbers(news["time_s"], 0)])
-        for mine, theirs, width in ((self.mean, news["mean"], 2), (self.cov, news["cov"], 3)):
-            for subject, rows in theirs.items():
-                mine[subject] = np.concatenate([mine.get(subject, np.zeros((0, width))), numbers(rows, width)])
+    def grown(self, news: dict[str, Any]) -> Track:
+        """The track with an `estimates` event appended."""
+
+        def appended(mine: dict[str, np.ndarray], theirs: dict[str, Any], width: int) -> dict[str, np.ndarray]:
+            before = {subject: mine.get(subject, np.zeros((0, width))) for subject in theirs}
+            return mine | {s: np.concatenate([before[s], numbers(rows, width)]) for s, rows in theirs.items()}
+
+        time_s = np.concatenate([self.time_s, numbers(news["time_s"], 0)])
+        return Track(time_s, appended(self.mean, news["mean"], 2), appended(self.cov, news["cov"], 3))
 
 
 #: A belief this near a true track is always shown, m.
@@ -91,13 +97,13 @@ def footage(view: dict[str, Any], algorithms: list[str]) -> Footage:
     names = [s["name"] for s in view["subjects"]]
     number = {name: n for n, name in enumerate(names)}
     time_s = numbers(view["time_s"], 0)
-    tracks = {name: Track() for name in algorithms}
+    tracks = {}
     for name in algorithms:
-        for subject, found in view.get("algorithms", {}).get(name, {"subjects": {}})["subjects"].items():
-            if found["mean"]:
-                tracks[name].time_s = time_s
-                tracks[name].mean[subject] = numbers(found["mean"], 2)
-                tracks[name].cov[subject] = numbers(found["cov"], 3)
+        subjects = view.get("algorithms", {}).get(name, {"subjects": {}})["subjects"]
+        told = {subject: found for subject, found in subjects.items() if found["mean"]}
+        mean = {subject: numbers(found["mean"], 2) for subject, found in told.items()}
+        cov = {subject: numbers(found["cov"], 3) for subject, found in told.items()}
+        tracks[name] = Track(time_s, mean, cov) if told else Track()
     packets = [
         Packet(number[e["from"]], number[e["to"]], e["tol_s"], e["toa_s"], e["heard"])
         for e in view["events"]

@@ -207,7 +207,8 @@ class Session:
                         continue
                     news = json.loads(event.data)
                     if news["algorithm"] in self._footage.tracks:
-                        self._footage.tracks[news["algorithm"]].grow(news)
+                        tracks = self._footage.tracks
+                        tracks[news["algorithm"]] = tracks[news["algorithm"]].grown(news)
                         self._stale.set()
             if jobs.find(job).state == "done":
                 text = await asyncio.to_thread(jobs.results.view, job)

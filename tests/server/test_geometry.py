@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.scenes.footage import at
+from server.scenes.footage import Track, at
 from server.scenes.geometry import (
     CORNERS,
     SPAN,
@@ -95,3 +95,14 @@ def test_positions_between_reports_are_interpolated_and_held_at_the_ends():
     assert at(time_s, rows, -1.0).tolist() == [0.0, 0.0]
     assert at(time_s, rows, 99.0).tolist() == [10.0, 20.0]
     assert np.isnan(at(np.zeros(0), np.zeros((0, 2)), 1.0)).all()
+
+
+def test_a_track_that_a_pane_is_drawn_from_stays_whole_as_estimates_arrive():
+    """Panes are drawn in other threads: whatever they hold has a mean and a covariance for each of its times."""
+    news = {"time_s": [0.0, 1.0], "mean": {"auv": [[0, 0], [1, None]]}, "cov": {"auv": [[1, 0, 1], [2, 0, 2]]}}
+    first = Track().grown(news)
+    second = first.grown(news | {"time_s": [2.0, 3.0]})
+    for track, rows in ((first, 2), (second, 4)):
+        assert len(track.time_s) == len(track.mean["auv"]) == len(track.cov["auv"]) == rows
+    np.testing.assert_array_equal(second.mean["auv"][:2], first.mean["auv"])
+    np.testing.assert_array_equal(at(second.time_s, second.cov["auv"], 2.5), [1.5, 0, 1.5])
