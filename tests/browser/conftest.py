@@ -184,6 +184,8 @@ def keep(request: pytest.FixtureRequest) -> Callable[[Page], Any]:
     def take(page: Page) -> None:
         nonlocal taken
         taken += 1
-        page.screenshot(path=ARTIFACTS / f"{name}-{taken}.png", timeout=60_000)
+        page.bring_to_front()  # of a page behind another there may be nothing to capture
+        with suppress(Error):  # a picture for people; what a test asserts is elsewhere
+            page.screenshot(path=ARTIFACTS / f"{name}-{taken}.png", timeout=60_000)
 
     return take
