@@ -24,6 +24,8 @@ def test_the_report_of_the_open_run_is_one_page_that_needs_nothing_else(page: Pa
     with page.expect_popup() as opened:
         page.get_by_role("link", name="Report", exact=True).click()
     report = opened.value
+    expect(report.get_by_role("heading", level=1)).to_contain_text("First look")
+    report.wait_for_load_state()
     report.on("request", lambda request: asked.append(request.url))
     report.reload()
     expect(report.get_by_role("heading", level=1)).to_contain_text("First look")
