@@ -2,10 +2,36 @@
 
 from __future__ import annotations
 
+import base64
 import gzip
-from functools import cache
+import hashlib
+from dataclasses import dataclass
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
+
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".ico": "image/x-icon",
+    ".json": "application/json",
+    ".woff2": "font/woff2",
+}
+#: Types that are compressed already.
+DENSE = {".png", ".ico", ".woff2"}
+
+
+@dataclass(frozen=True)
+class Asset:
+    """A file as it is sent: media type, bytes, the same compressed by gzip (None: no smaller), a tag of its content."""
+
+    media_type: str
+    plain: bytes
+    gzipped: bytes | None
+    tag: str
 
 
 def static_directory() -> Path:
@@ -15,21 +41,54 @@ def static_directory() -> Path:
     return inside if inside.is_dir() else here.parent / "static"
 
 
-def _package_file(package: str, *parts: str) -> Path:
-    spec = find_spec(package)
-    if spec is None or spec.origin is None:
-        raise RuntimeError(f"the package {package} is not installed completely")
-    return Path(spec.origin).parent.joinpath(*parts)
+def static_file(path: str) -> Asset | None:
+    """A file of the page by its path in the folder, as it is now; None where there is none."""
+    root = static_directory().resolve()
+    file = root if "\0" in path else (root / path).resolve()
+    if not file.is_relative_to(root) or file.suffix not in TYPES or not file.is_file():
+        return None
+    return _read(file, file.stat().st_mtime_ns)
+
+
+def index() -> Asset:
+    """The page itself, naming all modules: a browser asks for them at once and not import by import."""
+    root = static_directory()
+    scripts = sorted(file.relative_to(root).as_posix() for file in root.rglob("*.js"))
+    modules = tuple(path for path in scripts if not path.startswith("frames/"))
+    return _index((root / "index.html").read_bytes(), modules)
 
 
 @cache
-def plotly_js() -> tuple[bytes, bytes]:
-    """plotly.min.js of the installed package, as it is and compressed by gzip."""
-    plain = _package_file("plotly", "package_data", "plotly.min.js").read_bytes()
-    return plain, gzip.compress(plain, 6)
+def plotly_js() -> Asset:
+    """plotly.min.js of the installed package."""
+    return _asset(_package_file("plotly", "package_data", "plotly.min.js").read_bytes(), ".js")
 
 
 @cache
 def viser_client() -> str:
     """The HTML of viser's client, one file that needs no other."""
     return _package_file("viser", "client", "build", "index.html").read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=1000)
+def _read(file: Path, changed_ns: int) -> Asset:
+    return _asset(file.read_bytes(), file.suffix)
+
+
+@lru_cache(maxsize=4)
+def _index(written: bytes, modules: tuple[str, ...]) -> Asset:
+    links = "".join(f'  <link rel="modulepreload" href="/static/{path}">\n' for path in modules)
+    return _asset(written.replace(b"</head>", links.encode() + b"</head>", 1), ".html")
+
+
+def _asset(plain: bytes, suffix: str) -> Asset:
+    gzipped = None if suffix in DENSE else gzip.compress(plain, 6, mtime=0)
+    tag = base64.urlsafe_b64encode(hashlib.sha256(plain).digest()[:9]).decode()
+    return Asset(TYPES[suffix], plain, gzipped if gzipped and len(gzipped) < len(plain) else None, tag)
+
+
+def _package_file(package: str, *parts: str) -> Path:
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        raise RuntimeError(f"the package {package} is not installed completely")
+    return Path(spec.origin).parent.joinpath(*parts)

@@ -13,6 +13,7 @@ import dask.config
 from distributed import CancelledError as Dropped
 from distributed import Client, KilledWorker, LocalCluster
 from distributed.comm.core import CommClosedError
+from distributed.scheduler import DEFAULT_EXTENSIONS
 from distributed.security import Security
 
 from server import nursery, work
@@ -48,6 +49,8 @@ PROCESSES = {
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
 }
+#: What our scheduler does besides scheduling: all but spans, which keep something of every task there ever was.
+EXTENSIONS = {name: made for name, made in DEFAULT_EXTENSIONS.items() if name != "spans"}
 
 
 class WorkerDied(Exception):
@@ -74,7 +77,8 @@ async def _own_cluster(settings: Settings) -> LocalCluster:
             security=Security.temporary(),
             memory_limit=settings.worker_memory or "auto",
             dashboard_address=None,  # pyright: ignore[reportArgumentType]
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0", "extensions": EXTENSIONS},
+            extensions={},  # a worker's half of the spans
             silence_logs=logging.CRITICAL + 1,
             asynchronous=True,
         )  # pyright: ignore[reportGeneralTypeIssues]

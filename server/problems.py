@@ -14,6 +14,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.responses import Response
+from starlette.routing import Match, Route
 from uvicorn.protocols.utils import ClientDisconnected
 
 from engine.scenario.errors import ScenarioError
@@ -111,7 +112,14 @@ def _of_http(request: Request, error: HTTPException) -> Refusal:
         kind, detail = "unknown", f"there is nothing at {request.url.path[:200]}; what there is, /api/docs says"
     elif error.status_code == 405:
         kind, detail = "method", f"{request.method[:20]} is not possible here; what is, /api/docs says"
+        return Refusal(405, kind, detail, headers={"allow": ", ".join(sorted(_methods(request)))})
     return Refusal(error.status_code, kind, detail, headers=dict(error.headers or {}))
+
+
+def _methods(request: Request) -> set[str]:
+    """What can be asked of an address: each of its methods is a route of its own."""
+    here = [r for r in request.app.routes if isinstance(r, Route) and r.matches(request.scope)[0] is not Match.NONE]
+    return {method for route in here for method in route.methods or ()}
 
 
 def _name(asked: HTTPConnection) -> str:

@@ -7,6 +7,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -54,19 +55,24 @@ def load(path: Path | str) -> ScenarioBase:
     if path.is_dir():
         path = path / "scenario.toml"
     try:
-        if path.stat().st_size > MAX_BYTES:
+        state = path.stat()
+        if state.st_size > MAX_BYTES:
             raise ScenarioError([Problem("", "the file is too large for a scenario", "keep it below 4 MB")], str(path))
-        text = path.read_text(encoding="utf-8")
+        return _loaded(path.absolute(), state.st_mtime_ns, state.st_size)
     except FileNotFoundError:
         raise ScenarioError([Problem("", f"there is no file {path}", "check the path")]) from None
     except UnicodeDecodeError:
         raise ScenarioError([Problem("", "the file is not UTF-8 text", "save it as UTF-8")], str(path)) from None
     except OSError as error:
         raise ScenarioError([Problem("", f"cannot be read: {error.strerror}", "check the path")], str(path)) from None
-    try:
-        return loads(text, origin=str(path.parent.resolve()))
     except ScenarioError as error:
         raise ScenarioError(error.problems, str(path)) from None
+
+
+@lru_cache(maxsize=1000)
+def _loaded(path: Path, changed_ns: int, size: int) -> ScenarioBase:
+    """The scenario in a file as it was when it had that time and size: lists of all scenarios are asked for often."""
+    return loads(path.read_text(encoding="utf-8"), origin=str(path.parent.resolve()))
 
 
 def validate(data: Any, *, origin: str = "") -> ScenarioBase:

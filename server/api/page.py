@@ -2,53 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Header
-from fastapi.responses import FileResponse, Response
+from fastapi import APIRouter, Request, Response
 
 from server import assets
+from server.assets import Asset
 from server.problems import Refusal
 
 router = APIRouter(include_in_schema=False)
 
-TYPES = {
-    ".html": "text/html; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-    ".ico": "image/x-icon",
-    ".json": "application/json",
-    ".woff2": "font/woff2",
-}
+#: Asked for anew each time, for it has no version in its name; kept for a day.
+FRESH, A_DAY = "no-cache", "public, max-age=86400"
 
 
 @router.get("/")
-async def index() -> FileResponse:
-    return await static("index.html")
+async def index(request: Request) -> Response:
+    return _answer(request, assets.index(), FRESH)
 
 
 @router.get("/favicon.ico")
-async def icon() -> FileResponse:
-    return await static("icon.svg")
+async def icon(request: Request) -> Response:
+    return await static(request, "icon.svg")
 
 
 @router.get("/static/{path:path}")
-async def static(path: str) -> FileResponse:
-    """A file of the page, asked for anew each time, for it has no version in its name."""
-    root = assets.static_directory().resolve()
-    file = root if "\0" in path else (root / path).resolve()
-    if not file.is_relative_to(root) or not file.is_file() or file.suffix not in TYPES:
+async def static(request: Request, path: str) -> Response:
+    """A file of the page."""
+    asset = assets.static_file(path)
+    if asset is None:
         raise Refusal(404, "unknown", "there is no such file")
-    headers = {"cache-control": "no-cache"}
-    return FileResponse(file, media_type=TYPES[file.suffix], headers=headers, stat_result=file.stat())
+    return _answer(request, asset, FRESH)
 
 
 @router.get("/vendor/plotly.min.js")
-def plotly(accept_encoding: Annotated[str, Header()] = "") -> Response:
-    plain, compressed = assets.plotly_js()
-    headers = {"cache-control": "public, max-age=86400", "vary": "accept-encoding"}
-    if "gzip" in accept_encoding:
-        return Response(compressed, media_type=TYPES[".js"], headers=headers | {"content-encoding": "gzip"})
-    return Response(plain, media_type=TYPES[".js"], headers=headers)
+def plotly(request: Request) -> Response:
+    return _answer(request, assets.plotly_js(), A_DAY)
+
+
+def _answer(request: Request, asset: Asset, caching: str) -> Response:
+    """An asset as the browser takes it; nothing where the browser says that it has it."""
+    packed = asset.gzipped if "gzip" in request.headers.get("accept-encoding", "") else None
+    tag = f'"{asset.tag}-gzip"' if packed else f'"{asset.tag}"'
+    headers = {"cache-control": caching, "vary": "accept-encoding", "etag": tag}
+    if tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    if packed:
+        headers["content-encoding"] = "gzip"
+    return Response(packed or asset.plain, media_type=asset.media_type, headers=headers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import threading
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import rich
@@ -348,9 +349,10 @@ class Pane:
         shades = np.concatenate([np.zeros((0, 3), np.uint8), *colours]).astype(np.uint8)
         if not len(drawn):
             drawn, shades = np.full((1, 3), AWAY, np.float32), np.full((1, 3), self._look.water, np.uint8)
-        self.server.scene.add_point_cloud(
-            name, drawn, shades, point_size=size, point_shape="circle", point_shading="flat", precision="float32"
-        )
+        if not self._again(name, drawn, shades):
+            self.server.scene.add_point_cloud(
+                name, drawn, shades, point_size=size, point_shape="circle", point_shading="flat", precision="float32"
+            )
 
     def _lines(self, name: str, lines: list[np.ndarray], colours: list[palette.Rgb], pixels: float) -> None:
         """One set of line segments under a name that is used again; each line (M, 2, 3) in its colour."""
@@ -364,7 +366,15 @@ class Pane:
         ).astype(np.uint8)
         if not len(points):
             points, shades = np.full((1, 2, 3), AWAY, np.float32), np.full((1, 2, 3), self._look.water, np.uint8)
-        self.server.scene.add_line_segments(name, points, shades, thickness=pixels, thickness_units="screen")
+        if not self._again(name, points, shades):
+            self.server.scene.add_line_segments(name, points, shades, thickness=pixels, thickness_units="screen")
+
+    def _again(self, name: str, points: np.ndarray, colours: np.ndarray) -> bool:
+        """Whether lines or points of that name are there already, which then become these; what stays is not sent."""
+        handle: Any = self.server.scene.get_handle_by_name(name)
+        if handle is not None:
+            handle.points, handle.colors = points, colours
+        return handle is not None
 
 
 def _visible(rings: np.ndarray) -> np.ndarray:

@@ -43,15 +43,8 @@ POLICY = (
     "connect-src 'self' data: blob:; frame-ancestors 'self'; base-uri 'none'"
 )
 
-#: An unfocused pane must reconnect too; what it draws stays for pictures; and a pane shows its scene alone.
-HEAD = """<script>
-document.hasFocus = () => true;
-const getContext = HTMLCanvasElement.prototype.getContext;
-HTMLCanvasElement.prototype.getContext = function (kind, options) {
-  const kept = String(kind).startsWith("webgl") ? { ...options, preserveDrawingBuffer: true } : options;
-  return getContext.call(this, kind, kept);
-};
-</script><style>
+#: An unfocused pane must reconnect too; and a pane shows its scene alone.
+HEAD = """<script>document.hasFocus = () => true;</script><script src="/static/frames/pace.js"></script><style>
 .mantine-Paper-root, .mantine-Notifications-root, .mantine-Affix-root { display: none !important; }
 </style>"""
 

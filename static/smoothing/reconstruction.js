@@ -22,7 +22,7 @@ const dashed = (dash) => (dash ? dash.split(" ").map((n) => `${n}px`).join(",") 
 export const reconstructs = (scenario) => Object.values(scenario?.options ?? {}).some((o) => o.reconstruct_only);
 
 export function buildReconstructionStudy() {
-  const draws = el("select", { "aria-label": "Draws at each rate" }, [100, 30, 10].map((n) => el("option", { value: n }, n)));
+  const draws = el("select", { "aria-label": "Draws at each rate" }, [100, 30, 10, 3].map((n) => el("option", { value: n }, n)));
   const subject = el("select", { "aria-label": "Chain" });
   const go = startButton("Run the reconstruction study", start);
   const { root, status, bar, figures } = card(

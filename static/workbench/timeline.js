@@ -166,7 +166,7 @@ function paint(canvas, { heard, lost, fixes }) {
   }
   canvas.width = Math.round(width * ratio);
   canvas.height = Math.round(3 * LANE * ratio);
-  const pen = canvas.getContext("2d");
+  const pen = canvas.getContext("2d", { willReadFrequently: true });
   pen.scale(ratio, ratio);
   const style = getComputedStyle(canvas);
   const [start, end] = zoom.span;

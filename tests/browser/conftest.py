@@ -18,10 +18,8 @@ from tests.browser.serving import Server
 ARTIFACTS = Path(__file__).resolve().parents[2] / "test-artifacts"
 FLAGS = [
     "--headless=new",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
+    # As on a machine without a graphics card: the processor draws the page, and WebGL by SwiftShader.
     "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
     "--no-sandbox",
     "--disable-quic",
     "--disable-background-networking",
@@ -141,10 +139,10 @@ def solo(server: Server) -> str:
 
 
 @pytest.fixture(scope="module")
-def _opened(browser: Browser, server: Server, run: str) -> Iterator[Page]:
+def _opened(request: pytest.FixtureRequest, browser: Browser, server: Server, run: str) -> Iterator[Page]:
     with window(browser, server, Watch()) as context:
         page = context.new_page()
-        page.goto(f"/#run={run}")
+        page.goto(f"/#run={run}{getattr(request.module, 'LAYOUT', '')}")
         yield page
 
 

@@ -19,6 +19,9 @@ from tests.browser.test_time import now
 
 MEDIAN, MEAN, FIRST = "band", "mean", "first"
 
+#: The panes are looked at elsewhere; plans are drawn in less time.
+LAYOUT = "&layout=plan"
+
 
 def plot(page: Page, quantity: str) -> Locator:
     return page.locator(f".plot[data-quantity={quantity}]")
@@ -187,14 +190,14 @@ def test_zooming_by_keyboard(opened: Page):
 
 
 def test_a_span_in_the_address_is_shown(opened: Page, run: str):
-    opened.goto(f"/#run={run}&t=500&zoom=400-700&log=sigma_m&plots=sigma_m,nis")
+    opened.goto(f"/#run={run}{LAYOUT}&t=500&zoom=400-700&log=sigma_m&plots=sigma_m,nis")
     opened.reload()
     opened.locator(".plot .js-line").first.wait_for()
     expect(opened.locator(".whole")).to_be_visible()
     assert span(opened) == (400, 700) and now(opened) == 500
     expect(opened.locator("#plots .plot")).to_have_count(2)
     expect(plot(opened, "sigma_m").get_by_role("button", name="log")).to_have_attribute("aria-pressed", "true")
-    opened.goto(f"/#run={run}")
+    opened.goto(f"/#run={run}{LAYOUT}")
     expect(opened.locator("#plots .plot")).to_have_count(4)
     assert span(opened) == (0, 1200)
 

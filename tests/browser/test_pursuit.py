@@ -25,8 +25,8 @@ def chased(server: Server) -> str:
     return server.finished(CHASE)
 
 
-def show(page: Page, run: str) -> None:
-    page.goto(f"/#run={run}")
+def show(page: Page, run: str, layout: str = "plan") -> None:
+    page.goto(f"/#run={run}&layout={layout}")
     page.locator("#table tbody tr").first.wait_for()
     page.locator("#schedule .tape .spoke").first.wait_for()
 
@@ -36,7 +36,7 @@ def tape(page: Page, number: int):
 
 
 def test_formation_and_hyperbolas_are_a_layer_that_can_be_switched(page: Page, chased: str, keep):
-    show(page, chased)
+    show(page, chased, "side")
     for name in NAMES:
         page.locator(f".pane[data-algorithm={name}][data-state=shown]").wait_for()
     for other in ("Trails", "Ellipses", "Rays"):
@@ -106,7 +106,7 @@ def test_the_transfer_function_is_drawn_on_logarithmic_axes(page: Page, chased: 
 
 
 def test_other_missions_have_no_schedule(page: Page, solo: str):
-    page.goto(f"/#run={solo}")
+    page.goto(f"/#run={solo}&layout=plan")
     page.locator("#table tbody tr").first.wait_for()
     expect(page.locator("#schedule")).to_be_hidden()
     expect(page.get_by_label("Formation", exact=True)).to_be_hidden()

@@ -99,7 +99,7 @@ def test_two_runs_are_compared_against_the_pinned_one(page: Page, server: Server
 
 
 def test_a_run_that_is_opened_brings_back_what_it_was_made_of(page: Page, lossy: str):
-    page.goto(f"/#run={lossy}")
+    page.goto(f"/#run={lossy}&layout=plan")
     expect(page.locator("#field-trials")).to_have_value("2")
     expect(page.locator("#field-seed")).to_have_value("21")
     expect(page.locator("[id='field-network.loss']")).to_have_value("0.9")

@@ -18,14 +18,14 @@ def heard(server: Server) -> str:
     return server.finished(TWO_MODES)
 
 
-def show(page: Page, run: str) -> None:
-    page.goto(f"/#run={run}")
+def show(page: Page, run: str, layout: str = "plan") -> None:
+    page.goto(f"/#run={run}&layout={layout}")
     page.locator("#table tbody tr").first.wait_for()
     page.locator("#listening figure").first.wait_for()
 
 
 def test_beliefs_are_a_layer_that_can_be_switched(page: Page, heard: str, keep):
-    show(page, heard)
+    show(page, heard, "side")
     page.get_by_role("button", name="Previous measurement").click()
     page.get_by_role("button", name="Previous measurement").click()
     for other in ("Trails", "Ellipses", "Rays"):
@@ -75,7 +75,7 @@ def test_each_measurement_is_looked_into(page: Page, heard: str, keep):
 
 
 def test_estimators_that_hear_nothing_have_no_such_room(page: Page, solo: str):
-    page.goto(f"/#run={solo}")
+    page.goto(f"/#run={solo}&layout=plan")
     page.locator("#table tbody tr").first.wait_for()
     expect(page.locator("#listening")).to_be_hidden()
     expect(page.get_by_label("Beliefs", exact=True)).to_be_hidden()

@@ -24,14 +24,14 @@ def smoothed(server: Server) -> str:
     return server.finished(SURFACING)
 
 
-def show(page: Page, run: str) -> None:
-    page.goto(f"/#run={run}")
+def show(page: Page, run: str, layout: str = "plan") -> None:
+    page.goto(f"/#run={run}&layout={layout}")
     page.locator("#table tbody tr").first.wait_for()
     page.locator("#broadcasts li").first.wait_for()
 
 
 def test_the_factor_graph_is_a_layer_that_can_be_switched(page: Page, smoothed: str, keep):
-    show(page, smoothed)
+    show(page, smoothed, "side")
     eyes.see_the_vehicles(page, ["k_best", "centralized_smoother"])
     page.get_by_label("From above").check()
     for other in ("Trails", "Ellipses", "Rays"):
@@ -52,7 +52,7 @@ def test_the_factor_graph_is_a_layer_that_can_be_switched(page: Page, smoothed: 
 
 
 def test_estimators_without_a_graph_offer_no_layer_and_no_broadcasts(page: Page, solo: str):
-    page.goto(f"/#run={solo}")
+    page.goto(f"/#run={solo}&layout=plan")
     page.locator("#table tbody tr").first.wait_for()
     expect(page.get_by_label("Graph", exact=True)).to_be_hidden()
     expect(page.locator("#broadcasts")).to_be_hidden()
@@ -95,7 +95,7 @@ def test_the_reconstruction_study_draws_divergence_on_a_logarithmic_axis(page: P
     page.goto("/")
     page.locator("label[data-name=walls2015-reconstruction]").click()
     study = page.locator(".study", has=page.get_by_role("heading", name="Reconstruction against reception"))
-    study.get_by_label("Draws at each rate").select_option("10")
+    study.get_by_label("Draws at each rate").select_option("3")
     study.get_by_role("button", name="Run the reconstruction study").click()
     expect(study.locator("p[role=status]")).to_contain_text("10 reception rates", timeout=240_000)
     for figure in ("kld", "mean_difference"):

@@ -10,7 +10,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.browser.serving import Server
+from tests.browser.serving import Server, until
+
+#: The panes are looked at elsewhere; plans are drawn in less time.
+LAYOUT = "&layout=plan"
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +32,23 @@ def figures(text: str) -> tuple[float, float]:
     return float(found[1].replace("−", "-")), float(found[2])
 
 
+#: What the page was scrolled by is told to it with the next frame.
+TWO_FRAMES = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
+def point_at(target: Locator) -> None:
+    """Point at something that explains itself, again where the page scrolled to it only after the pointer had come."""
+    page = target.page
+
+    def told() -> bool:
+        page.mouse.move(5, 5)
+        target.hover()
+        page.evaluate(TWO_FRAMES)
+        return page.get_by_role("tooltip").is_visible()
+
+    until(told, "the sentence of what is pointed at")
+
+
 def test_differences_are_told_with_their_interval_and_what_it_means(opened: Page, view: dict[str, Any], keep):
     for subject in ("scout", "ship"):
         expect(cell(opened, "dead_reckoning", subject)).to_have_text("–")
@@ -40,7 +60,7 @@ def test_differences_are_told_with_their_interval_and_what_it_means(opened: Page
             expect(shown).to_have_attribute("data-kind", kind)
             expect(shown.locator(".kind")).to_have_text({"chance": "n.s.", "better": "▼", "worse": "▲"}[kind])
     opened.locator("#table").scroll_into_view_if_needed()
-    cell(opened, "nekf", "scout").hover()
+    point_at(cell(opened, "nekf", "scout"))
     expect(opened.get_by_role("tooltip")).to_contain_text("Over 3 trials")
     keep(opened)
 
@@ -83,7 +103,7 @@ def test_a_verdict_is_explained_in_a_sentence_on_focus(opened: Page, server: Ser
     opened.keyboard.press("Escape")
     expect(opened.get_by_role("tooltip")).to_be_hidden()
     opened.mouse.move(5, 5)
-    verdict.hover()
+    point_at(verdict)
     expect(opened.get_by_role("tooltip")).to_have_text(told)
     opened.mouse.move(5, 5)
     expect(opened.get_by_role("tooltip")).to_be_hidden()
@@ -124,7 +144,7 @@ def test_a_sentence_shown_by_focus_stays_until_the_focus_goes(opened: Page):
 
 def test_a_sentence_can_be_pointed_at_and_put_away(opened: Page):
     verdict = cell(opened, "cekf", "scout", ".verdict")
-    verdict.hover()
+    point_at(verdict)
     tooltip = opened.get_by_role("tooltip")
     box = tooltip.bounding_box()
     assert box
@@ -174,7 +194,7 @@ def test_the_table_is_copied_as_latex(opened: Page):
 
 def test_one_trial_tells_no_interval(page: Page, server: Server):
     alone = server.finished({"scenario": "first-look", "trials": 1, "algorithms": ["dead_reckoning", "nekf"]})
-    page.goto(f"/#run={alone}")
+    page.goto(f"/#run={alone}&layout=plan")
     shown = cell(page, "nekf", "scout")
     expect(shown).to_have_attribute("data-kind", "one")
     expect(shown).to_have_text(re.compile(r"^−[\d.]+$"))

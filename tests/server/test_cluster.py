@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import socket
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from distributed import LocalCluster
+from distributed.scheduler import TaskGroup
 from distributed.security import Security
 
 from engine import runner
@@ -63,6 +65,20 @@ def test_a_killed_worker_costs_a_shard_and_not_the_job(live: Live):
     os.kill(worker.pid, 9)
     assert live.finished(id)["state"] == "done"
     until(lambda: live.http.get("/api/health").json()["workers"] == 2, "the worker's successor")
+
+
+def test_the_scheduler_keeps_nothing_of_jobs_that_are_done(live: Live):
+    def kept() -> int:
+        gc.collect()
+        return sum(type(thing) is TaskGroup for thing in gc.get_objects())
+
+    few, many = 6, 18  # more jobs than are remembered on purpose
+    for seed in range(few):
+        live.done(SHORT | {"seed": seed})
+    after_few = kept()
+    for seed in range(few, many):
+        live.done(SHORT | {"seed": seed})
+    until(lambda: kept() <= after_few + 1, f"no more than {after_few} groups of tasks in memory", 20)
 
 
 def test_a_cluster_that_does_not_answer_is_told_and_jobs_wait(tmp_path: Path):

@@ -1,0 +1,124 @@
+// Runs in a pane's frame before viser's client: how often it draws.
+//
+// Where a graphics card draws, as often as it likes. Where a processor has to (WebGL in software), frames that come
+// faster than they are drawn would pile up and keep the whole page waiting: there a pane draws without smoothing, the
+// panes of a page take turns, none begins before the last picture is done, and one in which nothing happens rests.
+(() => {
+  const SOFTWARE = /swiftshader|llvmpipe|softpipe|basic render|software/i;
+  /** A pane draws for so long after something happened in it, and then once in a while, ms. */
+  const AWAKE_MS = 700;
+  const REST_MS = 5000;
+  /** A turn that is not given back is taken after so long, ms. */
+  const PATIENCE_MS = 2000;
+
+  const getContext = HTMLCanvasElement.prototype.getContext;
+  const nextFrame = window.requestAnimationFrame.bind(window);
+  const turns = (window.parent.paneTurns ??= { holder: null, since: 0, queue: [] });
+  let software = null;
+  let gl = null;
+
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    if (!String(kind).startsWith("webgl")) return getContext.call(this, kind, options);
+    // What is drawn stays, for pictures of the pane.
+    const context = getContext.call(this, kind, { ...options, preserveDrawingBuffer: true, antialias: software ? false : options?.antialias });
+    if (context !== null) {
+      software ??= inSoftware(context);
+      gl = context;
+    }
+    return context;
+  };
+
+  function inSoftware(context) {
+    const known = context.getExtension("WEBGL_debug_renderer_info");
+    return known !== null && SOFTWARE.test(context.getParameter(known.UNMASKED_RENDERER_WEBGL));
+  }
+
+  const asked = new Map();
+  let count = 0;
+  let planned = false;
+  let resting = 0;
+  let awakeUntil = performance.now() + 10 * AWAKE_MS;
+
+  window.requestAnimationFrame = (callback) => {
+    asked.set(++count, callback);
+    plan();
+    return count;
+  };
+  window.cancelAnimationFrame = (id) => asked.delete(id);
+
+  function plan() {
+    if (planned || resting) return;
+    if (!software || performance.now() < awakeUntil) {
+      planned = true;
+      nextFrame(run);
+    } else {
+      resting = setTimeout(wake, REST_MS, 0);
+    }
+  }
+
+  /** Draws what is asked for, and all that is asked for in the next while. */
+  function wake(ms = AWAKE_MS) {
+    awakeUntil = Math.max(awakeUntil, performance.now() + ms);
+    if (!resting) return;
+    clearTimeout(resting);
+    resting = 0;
+    planned = true;
+    nextFrame(run);
+  }
+
+  function run(time) {
+    if (software && !takeTurn()) {
+      nextFrame(run);
+      return;
+    }
+    planned = false;
+    const callbacks = [...asked.values()];
+    asked.clear();
+    for (const callback of callbacks) {
+      try {
+        callback(time);
+      } catch (error) {
+        reportError(error);
+      }
+    }
+    if (software) giveBack();
+  }
+
+  function takeTurn() {
+    const { queue } = turns;
+    if (!queue.includes(window)) queue.push(window);
+    const now = Date.now();
+    if (turns.holder !== null && now - turns.since < PATIENCE_MS) return false;
+    if (queue[0] !== window && now - turns.since < PATIENCE_MS) return false;
+    queue.splice(queue.indexOf(window), 1);
+    turns.holder = window;
+    turns.since = now;
+    return true;
+  }
+
+  /** Another pane may draw once this picture is done. */
+  function giveBack() {
+    const fence = gl?.fenceSync?.(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) ?? null;
+    gl?.flush();
+    const look = () => {
+      if (turns.holder !== window) return;
+      if (fence === null || gl.isContextLost() || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED) {
+        gl?.deleteSync?.(fence);
+        turns.holder = null;
+        turns.since = Date.now();
+      } else setTimeout(look, 4);
+    };
+    setTimeout(look, 0);
+  }
+
+  const Native = window.Worker;
+  window.Worker = class extends Native {
+    constructor(...args) {
+      super(...args);
+      this.addEventListener("message", () => wake());
+    }
+  };
+  for (const kind of ["pointerdown", "pointermove", "pointerup", "wheel", "keydown", "resize"]) {
+    window.addEventListener(kind, () => wake(), { capture: true, passive: true });
+  }
+})();
