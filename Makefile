@@ -17,7 +17,7 @@ serve: $(VENV)/.installed
 
 # The engine's tests on all cores; the server's and the page's need the cores themselves.
 test: $(VENV)/.installed-test browser
-	$(BIN)/pytest -n auto --dist loadfile tests/engine $(PYTEST_ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist loadfile tests/engine $(PYTEST_ARGS)
 	$(BIN)/pytest tests/server tests/browser $(PYTEST_ARGS)
 
 lint: $(VENV)/.installed-test

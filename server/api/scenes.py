@@ -71,4 +71,4 @@ async def pane_socket(socket: WebSocket, id: str, here: Here) -> None:
     if found is None:
         await socket.close(1008)
         return
-    await relay.relay(socket, found.port, found.secret)
+    await relay.relay(socket, found)

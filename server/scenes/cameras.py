@@ -62,7 +62,8 @@ class Cameras:
             @client.camera.on_update
             def moved(camera: viser.CameraHandle) -> None:
                 nonlocal told, settled, turns, deadline
-                pose, now = np.concatenate([camera.position, camera.look_at]), time.monotonic()
+                now = time.monotonic()
+                pose = np.concatenate([camera.position, camera.look_at]) if pane.said is None else pane.said
                 if settled and turns != self._turns:
                     settled, deadline = False, now + TURN_S
                 turns = self._turns

@@ -39,6 +39,8 @@ class Pane:
         self.secret = secrets.token_urlsafe(24)
         self.server = inner.start(self.secret)
         self._lock = threading.Lock()
+        #: Where a viewer said last that it is, (6,): viser mixes that with where it has been told to go.
+        self.said: np.ndarray | None = None
         self.footage: Footage
         self.ensembles: Mapping[str, Ensemble] = {}
         self._chart: Chart

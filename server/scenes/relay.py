@@ -7,6 +7,7 @@ import contextlib
 import math
 
 import msgspec
+import numpy as np
 import websockets
 from fastapi import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import connect
@@ -14,6 +15,7 @@ from websockets.typing import Subprotocol
 
 from server.assets import viser_client
 from server.scenes import inner
+from server.scenes.pane import Pane
 
 LARGEST = 4096
 Three = tuple[float, float, float]
@@ -58,21 +60,22 @@ def page() -> str:
 _camera = msgspec.msgpack.Decoder(Camera)
 
 
-def permitted(data: bytes) -> bool:
-    """Whether a viewer's message may reach viser."""
+def permitted(data: bytes) -> Camera | None:
+    """What a viewer says, if it may reach viser."""
     try:
-        return len(data) <= LARGEST and _camera.decode(data).finite()
+        said = _camera.decode(data) if len(data) <= LARGEST else None
     except (msgspec.DecodeError, RecursionError):
-        return False
+        return None
+    return said if said is not None and said.finite() else None
 
 
-async def relay(viewer: WebSocket, port: int, secret: str) -> None:
-    """Pass a viewer's websocket on to viser on a loopback port, both ways, until either ends."""
+async def relay(viewer: WebSocket, pane: Pane) -> None:
+    """Pass a viewer's websocket on to a pane's viser on its loopback port, both ways, until either ends."""
     offered = [Subprotocol(p) for p in viewer.scope.get("subprotocols", [])]
     try:
         upstream = await connect(
-            f"ws://127.0.0.1:{port}/",
-            additional_headers={inner.HEADER: secret},
+            f"ws://127.0.0.1:{pane.port}/",
+            additional_headers={inner.HEADER: pane.secret},
             subprotocols=offered or None,
             max_size=None,
             compression=None,
@@ -94,7 +97,9 @@ async def relay(viewer: WebSocket, port: int, secret: str) -> None:
                 if message["type"] == "websocket.disconnect":
                     return
                 data = message.get("bytes") or b""
-                if permitted(data):
+                said = permitted(data)
+                if said is not None:
+                    pane.said = np.array([*said.position, *said.look_at])
                     await upstream.send(data)
 
         ways = [asyncio.create_task(down()), asyncio.create_task(up())]

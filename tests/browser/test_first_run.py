@@ -82,6 +82,7 @@ def test_three_estimators_run_side_by_side(page: Page, keep):
     see_the_vehicles(page, THREE)
     for quantity in ("sigma_m", "error_m"):
         expect(page.locator(f".plot[data-quantity={quantity}] .js-line")).to_have_count(3)
+    assert "camera=" not in page.url, "nobody has moved a camera"
     keep(page)
 
 
