@@ -176,3 +176,15 @@ def test_a_vehicle_is_followed(page: Page, many: str):
         page.locator("#stage").focus()
         page.keyboard.press(share)
         until(middle, f"the scout in the middle at {share}")
+
+
+def test_six_panes_are_the_most_and_a_hidden_one_makes_room(page: Page, server: Server):
+    seven = ["dead_reckoning", "cekf", "nekf", "interleaved_update", "deif", "mdeif", "k_last"]
+    run = server.finished({"scenario": "first-look", "trials": 1, "algorithms": seven})
+    page.goto(f"/#run={run}&layout=plan")
+    expect(page.locator(".pane[data-state=shown]")).to_have_count(6)
+    expect(page.locator(".pane[data-algorithm=k_last]")).to_have_count(0)
+    expect(page.locator("#panes .note")).to_contain_text("1 more estimator")
+    page.locator(".chip[data-name=nekf]").click()
+    expect(page.locator(".pane[data-algorithm=k_last][data-state=shown]")).to_be_visible()
+    expect(page.locator(".pane")).to_have_count(6)
