@@ -58,7 +58,7 @@ def load(path: Path | str) -> ScenarioBase:
         state = path.stat()
         if state.st_size > MAX_BYTES:
             raise ScenarioError([Problem("", "the file is too large for a scenario", "keep it below 4 MB")], str(path))
-        return _loaded(path.absolute(), state.st_mtime_ns, state.st_size)
+        return _loaded(path.absolute(), (state.st_mtime_ns, state.st_size, state.st_ino))
     except FileNotFoundError:
         raise ScenarioError([Problem("", f"there is no file {path}", "check the path")]) from None
     except UnicodeDecodeError:
@@ -70,8 +70,8 @@ def load(path: Path | str) -> ScenarioBase:
 
 
 @lru_cache(maxsize=1000)
-def _loaded(path: Path, changed_ns: int, size: int) -> ScenarioBase:
-    """The scenario in a file as it was when it had that time and size: lists of all scenarios are asked for often."""
+def _loaded(path: Path, state: tuple[int, ...]) -> ScenarioBase:
+    """The scenario in a file, read once for each state (time, size, inode): lists of all scenarios are asked for often."""
     return loads(path.read_text(encoding="utf-8"), origin=str(path.parent.resolve()))
 
 

@@ -60,10 +60,9 @@ class Cameras:
             deadline = told + SETTLE_S
 
             @client.camera.on_update
-            def moved(camera: viser.CameraHandle) -> None:
+            def moved(_: viser.CameraHandle) -> None:
                 nonlocal told, settled, turns, deadline
-                now = time.monotonic()
-                pose = np.concatenate([camera.position, camera.look_at]) if pane.said is None else pane.said
+                pose, now = pane.said, time.monotonic()
                 if settled and turns != self._turns:
                     settled, deadline = False, now + TURN_S
                 turns = self._turns

@@ -40,7 +40,7 @@ class Pane:
         self.server = inner.start(self.secret)
         self._lock = threading.Lock()
         #: Where a viewer said last that it is, (6,): viser mixes that with where it has been told to go.
-        self.said: np.ndarray | None = None
+        self.said = np.full(6, np.nan)
         self.footage: Footage
         self.ensembles: Mapping[str, Ensemble] = {}
         self._chart: Chart

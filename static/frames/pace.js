@@ -8,12 +8,13 @@
   /** A pane draws for so long after something happened in it, and then once in a while, ms. */
   const AWAKE_MS = 700;
   const REST_MS = 5000;
-  /** A turn that is not given back is taken after so long, ms. */
+  /** A turn that is not given back is taken after so long, and who has not asked for one so long waits no more, ms. */
   const PATIENCE_MS = 2000;
+  const GONE_MS = 300;
 
   const getContext = HTMLCanvasElement.prototype.getContext;
   const nextFrame = window.requestAnimationFrame.bind(window);
-  const turns = (window.parent.paneTurns ??= { holder: null, since: 0, queue: [] });
+  const turns = (window.parent.paneTurns ??= { holder: null, since: 0, waiting: new Map() });
   let software = null;
   let gl = null;
 
@@ -84,13 +85,16 @@
     if (software) giveBack();
   }
 
+  /** Whether this pane may draw now: who waits longest goes first; a pane that is hidden or closed no longer waits. */
   function takeTurn() {
-    const { queue } = turns;
-    if (!queue.includes(window)) queue.push(window);
+    const { waiting } = turns;
     const now = Date.now();
+    const mine = { since: waiting.get(window)?.since ?? now, asked: now };
+    waiting.set(window, mine);
+    for (const [other, { asked }] of waiting) if (now - asked > GONE_MS) waiting.delete(other);
     if (turns.holder !== null && now - turns.since < PATIENCE_MS) return false;
-    if (queue[0] !== window && now - turns.since < PATIENCE_MS) return false;
-    queue.splice(queue.indexOf(window), 1);
+    for (const { since } of waiting.values()) if (since < mine.since) return false;
+    waiting.delete(window);
     turns.holder = window;
     turns.since = now;
     return true;
@@ -101,12 +105,13 @@
     const fence = gl?.fenceSync?.(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) ?? null;
     gl?.flush();
     const look = () => {
-      if (turns.holder !== window) return;
-      if (fence === null || gl.isContextLost() || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED) {
-        gl?.deleteSync?.(fence);
-        turns.holder = null;
-        turns.since = Date.now();
-      } else setTimeout(look, 4);
+      const done = fence === null || gl.isContextLost() || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED;
+      if (!done && turns.holder === window) {
+        setTimeout(look, 4);
+        return;
+      }
+      gl?.deleteSync?.(fence);
+      if (turns.holder === window) turns.holder = null;
     };
     setTimeout(look, 0);
   }

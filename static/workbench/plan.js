@@ -42,6 +42,7 @@ export function drawPlan(canvas, state, algorithms, moment, where, options) {
   if (!width || !height) return;
   if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);
   if (canvas.height !== Math.round(height * ratio)) canvas.height = Math.round(height * ratio);
+  // Drawn by the processor: thin lines are no work for it, and much for WebGL in software.
   const pen = canvas.getContext("2d", { willReadFrequently: true });
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.fillStyle = token("--water");

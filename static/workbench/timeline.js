@@ -166,6 +166,7 @@ function paint(canvas, { heard, lost, fixes }) {
   }
   canvas.width = Math.round(width * ratio);
   canvas.height = Math.round(3 * LANE * ratio);
+  // Drawn by the processor: thin lines are no work for it, and much for WebGL in software.
   const pen = canvas.getContext("2d", { willReadFrequently: true });
   pen.scale(ratio, ratio);
   const style = getComputedStyle(canvas);
