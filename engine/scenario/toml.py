@@ -71,7 +71,7 @@ def load(path: Path | str) -> ScenarioBase:
 
 @lru_cache(maxsize=1000)
 def _loaded(path: Path, state: tuple[int, ...]) -> ScenarioBase:
-    """The scenario in a file, read once for each state (time, size, inode): lists of all scenarios are asked for often."""
+    """The scenario in a file, read once for each state (time, size, inode): lists of all are asked for often."""
     return loads(path.read_text(encoding="utf-8"), origin=str(path.parent.resolve()))
 
 
