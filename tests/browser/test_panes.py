@@ -188,3 +188,14 @@ def test_six_panes_are_the_most_and_a_hidden_one_makes_room(page: Page, server: 
     page.locator(".chip[data-name=nekf]").click()
     expect(page.locator(".pane[data-algorithm=k_last][data-state=shown]")).to_be_visible()
     expect(page.locator(".pane")).to_have_count(6)
+
+
+def test_a_pane_that_went_while_it_waited_for_its_turn_keeps_no_other_waiting(page: Page, solo: str):
+    page.goto(f"/#run={solo}")
+    see_the_vehicles(page, ["cekf"])
+    before = settled(page, "cekf")
+    page.evaluate("() => paneTurns.waiting.set((window.gone = {}), { since: 0, asked: Date.now() })")
+    page.locator("#stage").focus()
+    page.keyboard.press("Home")
+    until(lambda: difference(before, pixels(page, "cekf")) > 0.005, "the pane to be drawn again")
+    assert not page.evaluate("() => paneTurns.waiting.has(gone)")
