@@ -5,8 +5,8 @@
 // panes of a page take turns, none begins before the last picture is done, and one in which nothing happens rests.
 (() => {
   const SOFTWARE = /swiftshader|llvmpipe|softpipe|basic render|software/i;
-  /** A pane draws for so long after something happened in it, and then once in a while, ms. */
-  const AWAKE_MS = 700;
+  /** A pane draws what is asked for so long after something happened in it, and then once in a while, ms: labels take time. */
+  const AWAKE_MS = 5000;
   const REST_MS = 5000;
   /** A turn that is not given back is taken after so long, and who has not asked for one so long waits no more, ms. */
   const PATIENCE_MS = 2000;
@@ -38,7 +38,7 @@
   let count = 0;
   let planned = false;
   let resting = 0;
-  let awakeUntil = performance.now() + 10 * AWAKE_MS;
+  let awakeUntil = performance.now() + 2 * AWAKE_MS;
 
   window.requestAnimationFrame = (callback) => {
     asked.set(++count, callback);
