@@ -3,9 +3,10 @@
 The state of a kernel is a value of every *ambiguous* variable (one that no prior or odometry determines). What the
 other variables are, given it, the Bayes tree says in closed form (propagation.py), and with it how well that value
 explains everything measured: its evidence. When factors arrive, kernels are weighted by what they add to the
-evidence, resampled, and moved by Markov chain steps that leave the posterior as it is: draws towards one beacon from
-the factors on it (batch Gibbs, C19 eq. 4.99), differences between other kernels, and new labels of mixtures. Poses are
-drawn in the end, jointly, from the root down.
+evidence. Once the weights are uneven, kernels are resampled and moved by Markov chain steps that leave the posterior
+as it is (iterated batch importance sampling, Chopin 2002): draws towards one beacon from the factors on it (batch
+Gibbs, C19 eq. 4.99), differences between other kernels, and new labels of mixtures. The more is known, the less a
+factor adds and the rarer that is. Poses are drawn in the end, jointly, from the root down.
 
 With a lag, poses that are older are drawn and marginalized: what they said of those that stay and of the beacons
 becomes one Gaussian for each kernel, linearized where the kernel then was. Work and memory no longer grow.
@@ -13,7 +14,8 @@ becomes one Gaussian for each kernel, linearized where the kernel then was. Work
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +38,8 @@ REDRAWS = 3
 SETTLINGS = 2
 #: How many times more kernels first look for a new beacon, all around.
 SCOUTS = 8
+#: Share of the kernels that must count; with fewer they are resampled and moved.
+COUNTING = 0.8
 #: The spreads between which a kernel's step is drawn when it does not follow the others, m, and the share of those.
 STEPS_M, OWN_STEPS = (0.02, 3.0), 0.3
 #: Poses marginalized at a time, in one dense step.
@@ -46,7 +50,10 @@ SETTLED = 1e-3
 
 @dataclass(frozen=True)
 class Step:
-    """What one extension did: its tree and which cliques were not done again, effective kernels, moves taken."""
+    """What one extension did: its tree and which cliques were not done again, effective kernels, share of moves taken.
+
+    accepted is nan where the weights stayed even enough for kernels not to be moved.
+    """
 
     tree: BayesTree
     reused: frozenset[int]
@@ -58,7 +65,7 @@ class Solver:
     """Grows a graph and keeps its beliefs; the same seed and extensions give the same kernels."""
 
     def __init__(
-        self, kernels: int = 100, seed: int | np.random.SeedSequence = 0, sweeps: int = 4, lag: int | None = None
+        self, kernels: int = 100, seed: int | np.random.SeedSequence = 0, sweeps: int = 6, lag: int | None = None
     ) -> None:
         if kernels < 4:
             raise ValueError(f"a belief needs at least 4 kernels, got {kernels}")
@@ -73,6 +80,7 @@ class Solver:
         self._given: frozenset[str] = frozenset()
         self._past: dict[str, np.ndarray] = {}
         self._evidence = np.zeros(kernels)
+        self._log_weight = np.zeros(kernels)
         self._up: Up | None = None
 
     @property
@@ -84,43 +92,50 @@ class Solver:
         """Add variables and factors and bring the beliefs up to date."""
         added, made = list(factors), self._propagation.made
         self.graph.add(kinds, added)
+        before = self._given
         self._given = frozenset(self.graph.ambiguous())
         wanted = self.kernels
-        if any(v in self._given for v in kinds):
+        new = any(v in self._given for v in kinds)
+        if new:
             self.kernels = SCOUTS * wanted
             self._take(np.repeat(np.arange(wanted), SCOUTS))
-        late, log_q = self._enter(kinds, added)
+        log_q = self._evidence + self._enter(kinds, added)
         self._grow(kinds, added)
-        before = self._known_evidence(late)
-        self._settle()
-        weights = self._evidence - before - log_q
-        weights = np.exp(weights - weights.max())
+        self._evidence = self._settle()
+        # Where a beacon has become determined, what its kernels' values were drawn by has no weight against others.
+        placed = not before <= self._given
+        self._log_weight = self._log_weight + (0.0 if placed else self._evidence - log_q)
+        weights = np.exp(self._log_weight - self._log_weight.max())
         effective = float(weights.sum() ** 2 / np.square(weights).sum())
         grown, messages = self.tree, self._up.messages if self._up else {}
         reused = frozenset(clique for clique, number in messages.items() if number <= made)
-        accepted = 0.0
+        accepted = np.nan
         self.kernels = wanted
-        if self._given:
-            self._resample(weights / weights.sum())
+        if self._given and (new or placed or effective < COUNTING * wanted):
+            self._take(self._evenly())
+            self._log_weight = np.zeros(wanted)
             accepted = float(np.mean([self._sweep(n % REDRAWS == 0) for n in range(self.sweeps)]))
         if self.lag is not None:
             self._forget(self.lag)
         return Step(grown, reused, effective, accepted)
 
     def beliefs(self, variables: Iterable[str] | None = None) -> dict[str, np.ndarray]:
-        """Joint draws (N, d) of these variables, one for each kernel; of all without an argument.
+        """Joint draws (N, d) of these variables, all of the same weight; of all variables without an argument.
 
         Of poses older than the lag they are those of when they were marginalized.
         """
-        up = self._pass()
-        drawn = down(self.graph, self.tree, up, self._given, self.kernels, self._rng)
-        found = self._past | drawn | {v: self._points.values[v] for v in self._given}
-        return {v: found[v] for v in (variables if variables is not None else found)}
+        found, chosen = self._past | self._draws(), self._evenly()
+        return {v: found[v][chosen] for v in (variables if variables is not None else found)}
 
     def misfit(self) -> Misfit:
         """How badly the measurements fit the mode that each kernel leads to."""
         mean = down(self.graph, self.tree, self._pass(), self._given, self.kernels, None)
         return misfit(self.graph, mean | {v: self._points.values[v] for v in self._given}, self.kernels)
+
+    def _draws(self) -> dict[str, np.ndarray]:
+        """A joint value (N, d) of all variables for each kernel."""
+        drawn = down(self.graph, self.tree, self._pass(), self._given, self.kernels, self._rng)
+        return drawn | {v: self._points.values[v] for v in self._given}
 
     def _grow(self, kinds: dict[str, Kind], added: list[Factor]) -> None:
         """The tree with these variables and factors, without another order where they do not reach.
@@ -144,14 +159,15 @@ class Solver:
 
     # -- entering variables
 
-    def _enter(self, kinds: dict[str, Kind], added: list[Factor]) -> tuple[list[Factor], np.ndarray]:
+    def _enter(self, kinds: dict[str, Kind], added: list[Factor]) -> np.ndarray:
         """Give every new variable a first point.
 
-        The new factors that first points do not already account for, and the log density (N,) of the draws by which
-        those are weighed that no factor accounts for.
+        The log density (N,), up to a constant, with which those that are the kernels' own were drawn.
         """
-        late, waiting, log_q = list(added), list(kinds), np.zeros(self.kernels)
+        waiting, log_q = list(kinds), np.zeros(self.kernels)
         strata = (np.arange(self.kernels) + 0.5) / self.kernels
+        known: list[Factor] = []
+        sources: list[Factor] = []
         drawn: dict[str, np.ndarray] | None = None
         while waiting:
             ready = [(v, f) for v in waiting if (f := self._source(v, waiting, added)) is not None]
@@ -164,11 +180,14 @@ class Solver:
             if v not in self._given:
                 strata_here = np.zeros(max(len(x) for x in values))
             elif self.graph.kinds[v] is LABEL:
+                # By the odds of its mixture, which the density leaves out.
                 strata_here = self._rng.permutation(strata)
-                late = [f for f in late if f is not source] if len(source.variables) == 1 else late
             else:
                 strata_here = self._rng.permutation(strata)
-                drawn = drawn if drawn is not None else self._drawn(set(waiting))
+                if drawn is None:
+                    known = [f for f in self.graph.factors if not set(waiting) & set(f.variables)]
+                    with self._only(known):
+                        drawn = down(self.graph, self.tree, self._pass(), self._given, self.kernels, self._rng)
                 values = [drawn.get(u, x) for u, x in zip(source.variables, values, strict=True)]
             self._points.set(v, source.sample(towards, values, strata_here, self._rng))
             waiting.remove(v)
@@ -176,23 +195,12 @@ class Solver:
                 values[towards] = self._points.values[v]
                 proposal = source.log_proposal(towards, values)
                 if proposal is None:
-                    late = [f for f in late if f is not source]
+                    sources.append(source)
                 else:
                     log_q = log_q + proposal
-        return late, log_q
-
-    def _drawn(self, waiting: set[str]) -> dict[str, np.ndarray]:
-        """Joint draws of all poses by the factors whose variables are all known."""
-        everything, kinds, given = self.graph.factors, self.graph.kinds, self._given
-        known = [v for v in kinds if v not in waiting]
-        self.graph.factors = [f for f in everything if not waiting & set(f.variables)]
-        sequence = order(known, [f.variables for f in self.graph.factors], [v for v in known if v in given])
-        grown = tree([f.variables for f in self.graph.factors], sequence)
-        try:
-            up = Propagation().up(self.graph, grown, self._points, given)
-            return down(self.graph, grown, up, given, self.kernels, self._rng)
-        finally:
-            self.graph.factors = everything
+        if sources:
+            log_q = log_q + self._evidence_of([*known, *sources]) - self._evidence_of(known)
+        return log_q
 
     def _source(self, v: str, waiting: list[str], added: list[Factor]) -> Factor | None:
         """A factor that can draw v from what is known; one that determines it where there is one."""
@@ -203,20 +211,23 @@ class Solver:
             return next(iter(able), None)
         return next((f for f in able if v in f.determined), None)
 
-    def _known_evidence(self, late: list[Factor]) -> np.ndarray:
-        """The evidence before the late factors, of the graph as it now is."""
-        if not self._given:
-            return self._evidence
-        everything = self.graph.factors
-        self.graph.factors = [f for f in everything if not any(f is g for g in late)]
+    @contextmanager
+    def _only(self, factors: list[Factor]) -> Iterator[None]:
+        """The graph as if it had these factors alone."""
+        kept = self.graph.factors, self.tree, self._propagation
+        scopes = [f.variables for f in factors]
+        named = list(dict.fromkeys(v for scope in scopes for v in scope))
+        self.graph.factors, self._propagation = factors, Propagation()
+        self.tree = tree(scopes, order(named, scopes, [v for v in named if v in self._given]))
         try:
-            self._settle()
-            return self._evidence
-        except ValueError:
-            # Without the late factors something is undetermined; then they cannot be weighed apart.
-            return np.zeros(self.kernels)
+            yield
         finally:
-            self.graph.factors = everything
+            self.graph.factors, self.tree, self._propagation = kept
+
+    def _evidence_of(self, factors: list[Factor]) -> np.ndarray:
+        """The evidence (N,) of these factors alone."""
+        with self._only(factors):
+            return self._settle()
 
     # -- evidence
 
@@ -230,8 +241,8 @@ class Solver:
             dict.fromkeys(v for f in self.graph.factors if not f.linear for v in f.variables if v not in self._given)
         )
 
-    def _settle(self) -> None:
-        """Move the points of linearization to the mode of the poses given each kernel; the evidence there."""
+    def _settle(self) -> np.ndarray:
+        """Move the points of linearization to the mode of the poses given each kernel; the evidence (N,) there."""
         curved = self._curved()
         for _ in range(SETTLINGS):
             up = self._pass()
@@ -245,17 +256,18 @@ class Solver:
                 break
         else:
             up = self._pass()
-        self._evidence = np.broadcast_to(up.log_evidence, (self.kernels,)).copy()
+        return np.broadcast_to(up.log_evidence, (self.kernels,)).copy()
 
-    def _resample(self, weights: np.ndarray) -> None:
-        """Systematic resampling."""
+    def _evenly(self) -> np.ndarray:
+        """Numbers (N,) of kernels, each about as often as its weight says (systematic resampling)."""
+        weights = np.exp(self._log_weight - self._log_weight.max())
         aims = (np.arange(self.kernels) + self._rng.random()) / self.kernels
-        self._take(np.minimum(np.searchsorted(np.cumsum(weights), aims), len(weights) - 1))
+        return np.minimum(np.searchsorted(np.cumsum(weights / weights.sum()), aims), len(weights) - 1)
 
     def _take(self, kept: np.ndarray) -> None:
         """Keep these kernels (N,), numbers that may repeat."""
         self._points.take(kept)
-        self._evidence = self._evidence[kept]
+        self._evidence, self._log_weight = self._evidence[kept], self._log_weight[kept]
         self._past = {v: drawn[kept] for v, drawn in self._past.items()}
         self.graph.factors = [f.taken(kept) for f in self.graph.factors]
 
@@ -266,7 +278,8 @@ class Solver:
         old = [v for v in self.graph.kinds if v not in self._given][:-lag]
         if not old:
             return
-        self._past |= self.beliefs(old)
+        drawn = self._draws()
+        self._past |= {v: drawn[v] for v in old}
         self._settle()
         while old:
             gone, old = old[:AT_ONCE], old[AT_ONCE:]
@@ -284,6 +297,7 @@ class Solver:
             self._points.drop(v)
         self._propagation, self.tree = Propagation(), BayesTree([], {})
         self._grow({}, [])
+        self._evidence = self._settle()
 
     # -- moves
 
@@ -305,15 +319,15 @@ class Solver:
         old, before = dict(self._points.values), self._evidence
         for v, value in proposed.items():
             self._points.set(v, value)
-        self._settle()
-        gain = self._evidence - before
+        after = self._settle()
+        gain = after - before
         if odds is not None:
             gain = gain + odds()
         keep = np.log(self._rng.random(self.kernels)) < np.where(np.isfinite(gain), gain, -np.inf)
         for v, value in self._points.values.items():
             if value is not old[v]:
                 self._points.set(v, np.where(keep[:, None], value, old[v]))
-        self._evidence = np.where(keep, self._evidence, before)
+        self._evidence = np.where(keep, after, before)
         return float(keep.mean())
 
     def _cross(self, beacons: list[str]) -> float:

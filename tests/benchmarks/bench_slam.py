@@ -47,7 +47,7 @@ def mission(poses: int, arrays: int, ranges: int = 0) -> SlamMission:
 
 def solved(log: SlamLog, flown: SlamMission, plan) -> tuple[np.ndarray, float]:
     """Seconds until each set of factors is in and its beliefs are drawn, and the error of the beacon's mean, m."""
-    solver = Solver(100, 1, 3)
+    solver = Solver(100, 1)
     steps, belief = [], np.zeros((1, 2))
     for growth in growths(log, plan, flown.time_s, 0.0):
         start = time.perf_counter()
@@ -91,7 +91,7 @@ def test_growth_with_poses_and_factors():
 
 def test_six_steps_of_the_nested_sampling_graph(recorded_data):
     start = time.perf_counter()
-    solver = Solver(500, 11, sweeps=6)
+    solver = Solver(500, 11, sweeps=12)
     for kinds, factors in nested_sampling_graph(recorded_data("nested-sampling")):
         solver.extend(kinds, factors)
         solver.beliefs()

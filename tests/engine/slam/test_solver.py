@@ -192,6 +192,37 @@ def test_one_range_gives_a_ring_two_give_two_modes_three_give_one():
     assert np.linalg.norm(last - beacon, axis=1).max() < 2.0
 
 
+def test_what_says_nothing_of_a_beacon_leaves_its_kernels_alone():
+    solver = Solver(100, 3)
+    solver.extend({"x0": POINT2, "l": POINT2}, [prior("x0", POINT2, [0, 0], np.eye(2)), ranging("x0", "l", 20.0, 0.3)])
+    before = solver.beliefs(["l"])["l"]
+    for k in range(3):
+        step = solver.extend(
+            {f"x{k + 1}": POINT2}, [displacement(f"x{k}", f"x{k + 1}", POINT2, [1, 0], 0.01 * np.eye(2))]
+        )
+        assert step.effective == pytest.approx(100) and np.isnan(step.accepted)
+    np.testing.assert_array_equal(solver.beliefs(["l"])["l"], before)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_counted_is_counted_once(seed: int):
+    """Wide ranges that come one by one, weighed rather than moved, have the moments of their sum over a grid."""
+    places, ranges, sigma = np.array([[0, 0], [8, 2], [16, -3], [24, 4]]), np.array([25.0, 22.0, 18.0, 21.0]), 4.0
+    solver = Solver(3000, seed, sweeps=1)
+    for k, (place, r) in enumerate(zip(places, ranges, strict=True)):
+        kinds = {f"x{k}": POINT2} | ({"l": POINT2} if k == 0 else {})
+        solver.extend(kinds, [prior(f"x{k}", POINT2, place, 1e-6 * np.eye(2)), ranging(f"x{k}", "l", r, sigma)])
+    axis = np.arange(-60.0, 80.0, 0.25)
+    at = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
+    off = np.linalg.norm(at[:, None] - places, axis=-1) - ranges
+    mass = np.exp(-0.5 * np.square(off / sigma).sum(-1))
+    mass /= mass.sum()
+    drawn, mean = solver.beliefs(["l"])["l"], mass @ at
+    spread = np.sqrt(mass @ np.square(at - mean))
+    assert (np.abs(drawn.mean(0) - mean) < 0.15 * spread).all()
+    np.testing.assert_allclose(drawn.std(0), spread, rtol=0.08)
+
+
 def test_a_variable_that_nothing_places_is_named():
     with pytest.raises(ValueError, match="x1"):
         Solver(10).extend({"x0": POINT2, "x1": POINT2}, [prior("x0", POINT2, [0, 0], np.eye(2))])
@@ -235,7 +266,7 @@ def test_posteriors_of_nested_sampling_are_met(recorded_data):
     it: by importance sampling with the beacons integrated on a grid 4000 draws of the poses keep an effective 3998.
     """
     folder = recorded_data("nested-sampling")
-    solver = Solver(500, 11, sweeps=6)
+    solver = Solver(500, 11, sweeps=12)
     dead_reckoned: dict[str, np.ndarray] = {}
     for k, (kinds, factors) in enumerate(nested_sampling_graph(folder)):
         solver.extend(kinds, factors)
@@ -264,7 +295,7 @@ def test_later_steps_agree_with_a_long_run_from_nothing(recorded_data):
     """Steps 4 and 5, of which there are no samples: grown step by step, against four times the kernels at once."""
     kinds: dict[str, Kind] = {}
     factors: list = []
-    solver = Solver(500, 11, sweeps=6)
+    solver = Solver(500, 11, sweeps=12)
     for k, (more, said) in enumerate(nested_sampling_graph(recorded_data("nested-sampling"))):
         solver.extend(more, said)
         kinds |= more
