@@ -145,14 +145,18 @@ class SyntheticArray:
     def _range_at(self, bin_: np.ndarray) -> np.ndarray:
         return self.ranges_m[0] + bin_ * (self.ranges_m[1] - self.ranges_m[0])
 
-    def output(self, i: int, range_m: np.ndarray) -> np.ndarray:
-        """Output (...,) of element i's matched filter at ranges (...,) from the beacon; zero outside the window."""
+    def output(self, i: int | np.ndarray, range_m: np.ndarray) -> np.ndarray:
+        """Output (...,) of element i's matched filter at ranges (...,) from the beacon; zero outside the window.
+
+        i may be an array of elements that broadcasts with the ranges.
+        """
         value, slope = self._tables
         spacing = self.ranges_m[1] - self.ranges_m[0]
         place = (range_m - self.ranges_m[0]) / spacing + 1.0
         place = np.clip(place, 0.0, value.shape[1] - 1.0)
         k = place.astype(np.intp)
-        return value[i].take(k) + slope[i].take(k) * (place - k).astype(np.float32)
+        here = k + np.asarray(i) * value.shape[1]
+        return value.take(here) + slope.take(here) * (place - k).astype(np.float32)
 
     @cached_property
     def _tables(self) -> tuple[np.ndarray, np.ndarray]:

@@ -47,6 +47,16 @@ class PoseOdometry(Factor):
         seen = np.stack([c * dx + s * dy, -s * dx + c * dy, b[..., 2] - a[..., 2]], axis=-1)
         return POSE2.difference(seen, self.delta) @ self.W.T
 
+    def linearize(self, *values: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        a, b = values
+        d = b[..., :2] - a[..., :2]
+        c, s = np.broadcast_arrays(np.cos(a[..., 2]), np.sin(a[..., 2]), d[..., 0])[:2]
+        J = np.zeros((*d.shape[:-1], 3, 3))
+        J[..., 0, 0], J[..., 0, 1], J[..., 1, 0], J[..., 1, 1], J[..., 2, 2] = c, s, -s, c, 1.0
+        back = -J
+        back[..., 0, 2], back[..., 1, 2] = c * d[..., 1] - s * d[..., 0], -c * d[..., 0] - s * d[..., 1]
+        return self.residual(*values), [self.W @ back, self.W @ J]
+
     def sample(
         self, towards: int, values: list[np.ndarray], strata: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:

@@ -139,29 +139,26 @@ class SyntheticAperture(Factor):
         return self._focused(peak)
 
     def _focused(self, peak: np.ndarray) -> np.ndarray:
+        elements = np.arange(peak.shape[-1])
         for _ in range(ROUNDS):
-            outputs = [self.array.output(i, peak[..., i]) for i in range(peak.shape[-1])]
-            whole = np.sum(outputs, axis=0)
-            for i, output in enumerate(outputs):
-                alone = self.array.output(i, peak[..., i, None] + STEPS_M)
-                chosen = np.abs((whole - output)[..., None] + alone).argmax(-1)
-                whole = whole - output + np.take_along_axis(alone, chosen[..., None], -1)[..., 0]
+            output = self.array.output(elements, peak)
+            moved = self.array.output(elements[:, None], peak[..., None] + STEPS_M)
+            whole = output.sum(-1)
+            for i in elements:
+                chosen = np.abs((whole - output[..., i])[..., None] + moved[..., i, :]).argmax(-1)
+                alone = np.take_along_axis(moved[..., i, :], chosen[..., None], -1)[..., 0]
+                whole = whole - output[..., i] + alone
                 peak[..., i] += STEPS_M[chosen]
         return peak
 
     def _curvature(self, peak: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Information (..., m, m) about the distances at a peak (..., m), and the log likelihood there (...,)."""
         m, h = peak.shape[-1], 0.04
-        z, first, second = [], [], []
-        for i in range(m):
-            low, mid, high = (self.array.output(i, peak[..., i] + s) for s in (-h, 0.0, h))
-            z.append(mid)
-            first.append((high - low) / (2 * h))
-            second.append((high - 2 * mid + low) / h**2)
-        total = np.sum(z, axis=0)
-        slope = np.stack(first, axis=-1)
+        shifted = peak + np.array([-h, 0.0, h]).reshape(3, *(1,) * peak.ndim)
+        low, mid, high = self.array.output(np.arange(m), shifted)
+        total, slope = mid.sum(-1), (high - low) / (2 * h)
         Lam = -2.0 * self._scale * np.real(np.conj(slope)[..., :, None] * slope[..., None, :])
-        bend = -2.0 * self._scale * np.real(np.conj(total)[..., None] * np.stack(second, axis=-1))
+        bend = -2.0 * self._scale * np.real(np.conj(total)[..., None] * (high - 2 * mid + low) / h**2)
         Lam[..., np.arange(m), np.arange(m)] += bend
         most = self.array.loudest
         below = self._scale * (np.square(np.abs(total)) - most)
