@@ -197,3 +197,24 @@ def test_told_to_end_the_server_lets_go_of_streams_and_workers_and_keeps_what_it
     server = start(Settings(data=tmp_path, port=0, workers=2))
     assert next(server).finished(id)["state"] == "done"
     assert next(server, None) is None
+
+
+def test_a_body_does_not_wait_until_its_head_is_acknowledged(tmp_path: Path):
+    """Nagle's rule would hold the second of two small writes back for up to 40 ms: every answer on a kept connection."""
+
+    async def delayed() -> bool:
+        found: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+
+        def accepted(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            sock = writer.get_extra_info("socket")
+            found.set_result(sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+            writer.close()
+
+        server = await asyncio.start_server(accepted, sock=serving.listen(Settings(data=tmp_path, port=0)))
+        async with server:
+            _, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+            at_once = await found
+            writer.close()
+        return not at_once
+
+    assert not asyncio.run(delayed())
