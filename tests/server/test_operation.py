@@ -200,7 +200,7 @@ def test_told_to_end_the_server_lets_go_of_streams_and_workers_and_keeps_what_it
 
 
 def test_a_body_does_not_wait_until_its_head_is_acknowledged(tmp_path: Path):
-    """Nagle's rule would hold the second of two small writes back for up to 40 ms: every answer on a kept connection."""
+    """Nagle's rule holds the second of two small writes back for up to 40 ms: of every answer on a kept connection."""
 
     async def delayed() -> bool:
         found: asyncio.Future[int] = asyncio.get_running_loop().create_future()
