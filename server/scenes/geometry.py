@@ -17,9 +17,9 @@ CORNERS = 24
 
 @dataclass(frozen=True)
 class Chart:
-    """Where metres are in the scene: centre (2,) m, scale in units per metre, stretch of depths."""
+    """Where metres are in the scene: centre (east, north) m, scale in units per metre, stretch of depths."""
 
-    centre: np.ndarray
+    centre: tuple[float, float]
     scale: float
     stretch: float
 
@@ -36,7 +36,8 @@ def chart(points_m: np.ndarray, deepest_m: float, stretch: float = 0.0) -> Chart
     low, high = (known.min(axis=0), known.max(axis=0)) if len(known) else (np.full(2, -500.0), np.full(2, 500.0))
     scale = SPAN / max(float((high - low).max()), 10.0)
     suits = min(max(DEPTH_SHOWN / (deepest_m * scale), 1.0), DEPTH_STRETCH) if deepest_m > 0 else 1.0
-    return Chart((low + high) / 2, scale, stretch or suits)
+    east, north = (low + high) / 2
+    return Chart((float(east), float(north)), scale, stretch or suits)
 
 
 def segments(line: np.ndarray) -> np.ndarray:

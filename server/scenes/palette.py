@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -44,6 +45,7 @@ def vehicle(index: int) -> Rgb:
     return VEHICLES[index % len(VEHICLES)]
 
 
+@cache
 def linear(colour: Rgb) -> np.ndarray:
     """A colour (3,) as viser takes it for the points of lines: in linear light, of which it makes sRGB itself."""
     c = np.array(colour) / 255

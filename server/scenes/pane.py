@@ -12,15 +12,14 @@ import rich
 
 from server.scenes import ensemble, graph, inner, palette, pursuit, sound
 from server.scenes.ensemble import Ensemble
-from server.scenes.footage import Footage, at
+from server.scenes.footage import Footage, Track, at
 from server.scenes.geometry import SPAN, Chart, compass, dashes, ellipses, radius, round_length, scale_bar, segments
 from server.scenes.options import Options
+from server.scenes.trail import Trail, trail
 from server.view import thinned
 
 #: What a browser can draw smoothly even without a graphics card.
 TRACK_POINTS, TRUTH_POINTS, ELLIPSES, RAYS = 250, 600, 20, 12
-#: Ellipses smaller than this (scene units) are not worth their lines.
-SMALLEST = 0.02
 #: A ray is seen for this share of the mission, and at least this long.
 RAY_SHARE, RAY_S = 0.006, 3.0
 #: Size of the points of a cloud (scene units), and where nothing is to be seen.
@@ -47,6 +46,7 @@ class Pane:
         self._look = palette.LIGHT
         self._graphed = self._clouded = self._pursued = self._sounded = False
         self._truth: Places = {}
+        self._made: dict[tuple[str, str, float, tuple[int, int]], tuple[Track, Trail]] = {}
         self._without: Sequence[str] | None = None
         self._staged = 0
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -75,7 +75,7 @@ class Pane:
 
     def stage(self, footage: Footage, chart: Chart, look: palette.Look = palette.LIGHT) -> None:
         """Send what stands still: the sea surface, scale and north, the true tracks, the vehicles with their names."""
-        self.footage, self._chart = footage, chart
+        self.footage, self._chart, self._made = footage, chart, {}
         scene = self.server.scene
         with self._lock, self.server.atomic():
             if look != self._look:
@@ -187,25 +187,31 @@ class Pane:
         footage = self.footage
         lines, rings, colours, shades = [], [], [], []
         many = max(len(now), 1)
+        most = max(2 * TRACK_POINTS // (many + 1), 60), max(2 * ELLIPSES // (many + 1), 6)
         for algorithm, places in now.items():
-            track = footage.tracks[algorithm]
-            horizon = max(len(footage.time_s), len(track.time_s))
-            past = int(np.searchsorted(track.time_s, moment_s, side="right"))
-            shown = thinned(horizon, max(2 * TRACK_POINTS // (many + 1), 60))
-            ringed = thinned(horizon, max(2 * ELLIPSES // (many + 1), 6))
             for n, name in enumerate(footage.names):
                 if name not in places or not self._moves(name):
                     continue
-                depth, mean, colour = self._depth(name), track.mean[name], self._colour(algorithm, n, options)
-                line = np.concatenate([mean[shown[shown < past]], places[name][None]])
-                lines.append(segments(self._chart.place(line, depth)))
+                colour = self._colour(algorithm, n, options)
+                line, ring = self._trail(algorithm, name, options, most).until(
+                    moment_s, self._chart.place(places[name], self._depth(name))
+                )
+                lines.append(line)
                 colours.append(colour)
-                chosen = ringed[ringed < past]
-                drawn = ellipses(self._chart, mean[chosen], track.cov[name][chosen], depth, radius(options.sigma))
-                rings.append(_visible(drawn))
+                rings.append(ring)
                 shades.append(self._look.faded(colour, 0.35))
         self._lines("/trails", lines if options.trails else [], colours, 2.0)
         self._lines("/ellipses", rings if options.ellipses else [], shades, 1.2)
+
+    def _trail(self, algorithm: str, name: str, options: Options, most: tuple[int, int]) -> Trail:
+        """A trail with ellipses of the wanted size; made once for each track."""
+        track, key = self.footage.tracks[algorithm], (algorithm, name, options.sigma, most)
+        of, made = self._made.get(key, (None, None))
+        if made is None or of is not track:
+            reports = max(len(self.footage.time_s), len(track.time_s))
+            made = trail(self._chart, track, name, self._depth(name), radius(options.sigma), reports=reports, most=most)
+            self._made[key] = track, made
+        return made
 
     def _present(self, moment_s: float, now: Mapping[str, Places], truth: Places, options: Options) -> None:
         """The present ellipses, and from every estimate a line to the truth; not where lines of density tell more."""
@@ -377,9 +383,3 @@ class Pane:
         if handle is not None:
             handle.points, handle.colors = points, colours
         return handle is not None
-
-
-def _visible(rings: np.ndarray) -> np.ndarray:
-    """Rings (N, CORNERS, 2, 3) that are large enough to be seen, as segments (M, 2, 3)."""
-    width = np.ptp(rings[..., 0, :2], axis=1).max(axis=-1, initial=0.0) if len(rings) else np.zeros(0)
-    return rings[width > SMALLEST].reshape(-1, 2, 3)

@@ -22,7 +22,7 @@ from server.scenes.geometry import (
     segments,
 )
 
-UNIT = Chart(np.zeros(2), 1.0, 1.0)
+UNIT = Chart((0.0, 0.0), 1.0, 1.0)
 
 
 @given(st.floats(0.1, 50), st.floats(0.1, 50), st.floats(-0.95, 0.95))

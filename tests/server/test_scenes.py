@@ -113,6 +113,24 @@ def test_the_panes_of_a_running_job_grow(live: Live):
         live.finished(id)
 
 
+def test_the_panes_of_a_running_job_stay_when_its_beliefs_by_sound_arrive(live: Live):
+    """The chart is made anew with what is believed: the same again where nothing lies outside of it."""
+    with session(live) as mine:
+        changes = {"trials": 2, "duration_s": 60, "arrays.count": 3}
+        id = live.submit({"scenario": "sas-two-modes", "algorithms": ["sas_static"], "set": changes})["id"]
+        mine.show(id, "sas_static")
+        live.finished(id)
+        (pane,) = live.app.state.site.scenes.panes.values()
+
+        def drawn() -> bool:
+            mine.say(type="seek", time_s=60.0)
+            mine.hear("at")
+            lines = pane.server.scene.get_handle_by_name("/sound/density")
+            return lines is not None and len(lines.points) > 1
+
+        until(drawn, "lines of density")
+
+
 def test_a_viewer_may_move_its_camera_and_nothing_else(live: Live, job: str):
     assert relay.permitted(camera(position=(1.0, 2.0, 3.0)))
     for place in ((1.0, 2.0), (1.0, 2.0, float("nan")), (1.0, 2.0, "x"), "abc"):

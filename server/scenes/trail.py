@@ -1,0 +1,44 @@
+"""Estimated tracks with the ellipses along them: placed in the scene once, cut off at the moment that is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from server.scenes.footage import Track
+from server.scenes.geometry import Chart, ellipses, segments
+from server.view import thinned
+
+#: Ellipses smaller than this (scene units) are not worth their lines.
+SMALLEST = 0.02
+
+
+@dataclass(frozen=True)
+class Trail:
+    """Scene positions points (K, 3) of the reports at time_s (K,), and rings (R, CORNERS, 2, 3) of those at ring_s."""
+
+    time_s: np.ndarray
+    points: np.ndarray
+    ring_s: np.ndarray
+    rings: np.ndarray
+
+    def until(self, moment_s: float, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Segments (M, 2, 3) of the line up to the place (3,) at a moment, and those of the ellipses passed."""
+        past = int(np.searchsorted(self.time_s, moment_s, side="right"))
+        line = np.concatenate([self.points[:past], place[None]])
+        passed = int(np.searchsorted(self.ring_s, moment_s, side="right"))
+        return segments(line), self.rings[:passed].reshape(-1, 2, 3)
+
+
+def trail(
+    chart: Chart, track: Track, subject: str, depth_m: float, radius: float, *, reports: int, most: tuple[int, int]
+) -> Trail:
+    """The trail of a subject of a track that will have so many reports; at most so many points, and rings, of all."""
+    mean, cov, known = track.mean[subject], track.cov[subject], len(track.time_s)
+    shown, ringed = (kept[kept < known] for kept in (thinned(reports, count) for count in most))
+    ringed = ringed[np.isfinite(mean[ringed]).all(axis=-1) & np.isfinite(cov[ringed]).all(axis=-1)]
+    rings = ellipses(chart, mean[ringed], cov[ringed], depth_m, radius)
+    seen = np.ptp(rings[..., 0, :2], axis=1).max(axis=-1, initial=0.0) > SMALLEST if len(rings) else np.zeros(0, bool)
+    placed = chart.place(mean[shown], depth_m)
+    return Trail(track.time_s[shown], placed, track.time_s[ringed[seen]], rings[seen])
