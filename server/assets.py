@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import os
+import re
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.util import find_spec
@@ -20,6 +22,9 @@ TYPES = {
     ".json": "application/json",
     ".woff2": "font/woff2",
 }
+#: A style sheet of the page's, and what a module imports.
+STYLE = re.compile(r'<link rel="stylesheet" href="/static/([^"]+)">')
+IMPORT = re.compile(r'^import .*"(\.[^"]+)";$', re.MULTILINE)
 #: Types that are compressed already.
 DENSE = {".png", ".ico", ".woff2"}
 
@@ -51,11 +56,32 @@ def static_file(path: str) -> Asset | None:
 
 
 def index() -> Asset:
-    """The page itself, naming all modules: a browser asks for them at once and not import by import."""
+    """The page itself with its styles, naming all modules: a browser asks for few files, and for all at once.
+
+    Those come first that main.js imports before it draws anything.
+    """
     root = static_directory()
     scripts = sorted(file.relative_to(root).as_posix() for file in root.rglob("*.js"))
-    modules = tuple(path for path in scripts if not path.startswith("frames/"))
-    return _index((root / "index.html").read_bytes(), modules)
+    first = _imported("main.js")
+    modules = (*first, *(path for path in scripts if path not in first and not path.startswith("frames/")))
+    written = STYLE.sub(lambda link: f"<style>\n{_text(link[1])}</style>", _text("index.html"))
+    return _index(written, modules)
+
+
+def _imported(start: str) -> list[str]:
+    """The paths of a module and of all that it imports, and they import, at its top; nearest first."""
+    found = [start]
+    for path in found:
+        for name in IMPORT.findall(_text(path)):
+            imported = os.path.normpath(f"{Path(path).parent}/{name}")
+            if imported not in found:
+                found.append(imported)
+    return found
+
+
+def _text(path: str) -> str:
+    asset = static_file(path)
+    return asset.plain.decode() if asset else ""
 
 
 @cache
@@ -76,9 +102,9 @@ def _read(file: Path, changed_ns: int) -> Asset:
 
 
 @lru_cache(maxsize=4)
-def _index(written: bytes, modules: tuple[str, ...]) -> Asset:
+def _index(written: str, modules: tuple[str, ...]) -> Asset:
     links = "".join(f'  <link rel="modulepreload" href="/static/{path}">\n' for path in modules)
-    return _asset(written.replace(b"</head>", links.encode() + b"</head>", 1), ".html")
+    return _asset(written.replace("</head>", f"{links}</head>", 1).encode(), ".html")
 
 
 def _asset(plain: bytes, suffix: str) -> Asset:

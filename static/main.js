@@ -1,42 +1,14 @@
-// Puts the page together: reads the library, follows the address, connects panes to their scenes.
+// Puts the page together: first what a new run is made from, while that is looked at all the rest.
 
-import { mountScorecard } from "./claims/scorecard.js";
-import { mountHelp } from "./help.js";
-import { listenKeys } from "./keyboard.js";
 import { mountAlgorithms } from "./library/algorithms.js";
 import { mountLaunch } from "./library/launch.js";
 import { mountMissions } from "./library/missions.js";
 import { mountPreview } from "./library/preview.js";
-import { part } from "./look/dom.js";
 import { mountNotices } from "./notices.js";
-import { mountSchedule } from "./pursuit/schedule.js";
 import { mountRooms } from "./rooms.js";
-import { mountRuns } from "./runs/runs.js";
 import { mountSide } from "./side.js";
-import { mountListening } from "./slam/listening.js";
-import { mountBroadcasts } from "./smoothing/broadcasts.js";
-import { clock } from "./state/clock.js";
-import { suspect } from "./state/connection.js";
-import { pickAgain, readLibrary } from "./state/library.js";
-import { mountLink } from "./state/link.js";
-import { keepPanesInLink, paneNames, paneState } from "./state/panes.js";
-import { startedByForm } from "./state/run.js";
-import { store } from "./state/store.js";
-import { isTrial } from "./state/whatif.js";
-import { mountStudies } from "./studies/studies.js";
+import { readLibrary } from "./state/library.js";
 import { mountTabs } from "./tabs.js";
-import { mountExplorer } from "./tracking/explorer.js";
-import { mountUpload } from "./upload/dialog.js";
-import { SceneSession } from "./wire/scenes.js";
-import { mountClaims } from "./workbench/claims.js";
-import { mountHeadline } from "./workbench/headline.js";
-import { mountPanes } from "./workbench/panes.js";
-import { mountPass } from "./workbench/pass.js";
-import { mountPlots } from "./workbench/plots.js";
-import { mountTable } from "./workbench/table.js";
-import { mountTimeline } from "./workbench/timeline.js";
-import { mountToolbar } from "./workbench/toolbar.js";
-import { mountWhatIf } from "./whatif/panel.js";
 
 mountRooms();
 mountSide();
@@ -45,60 +17,16 @@ mountNotices();
 mountMissions();
 mountAlgorithms();
 mountLaunch();
-mountWhatIf();
-mountUpload();
-mountPreview();
-mountExplorer();
-mountStudies();
-mountHeadline();
-mountPass();
 
-const panes = mountPanes(listenKeys);
-const session = new SceneSession({
-  scenes: (addresses) => panes.place(addresses),
-  camera: (pose) => paneState.set({ camera: pose }),
-  error: (detail) => panes.fail(detail),
-  link: (up) => (up ? store.set({ connected: true }) : suspect()),
-});
-mountToolbar(session, panes);
-keepPanesInLink((pose) => session.look(pose));
-mountTimeline();
-mountListening();
-mountSchedule();
-mountPlots();
-mountBroadcasts();
-mountTable();
-mountClaims();
-mountRuns();
-mountScorecard();
-listenKeys(window);
-mountHelp();
-
-store.watch(["run", "room"], ({ run, room }) => (part("workbench").hidden = run === null || room !== "workbench"));
-
-let shown = null;
-const showScenes = () => {
-  const { job, hidden } = store.state;
-  const { layout } = paneState.state;
-  const names = layout === "plan" ? [] : paneNames(job, layout, hidden);
-  const wanted = names.length ? JSON.stringify([job.id, names]) : null;
-  if (wanted === shown) return;
-  shown = wanted;
-  if (wanted === null) return;
-  session.show(job.id, names);
-  if (clock.end > clock.start && !clock.following) session.seek(clock.time);
-};
-store.watch(["job", "hidden"], showScenes);
-paneState.watch(["layout"], showScenes);
-let picked = null;
-store.watch(["job", "missions"], ({ job, missions }) => {
-  if (!job || missions === null || job.id === picked) return;
-  picked = job.id;
-  if (!startedByForm(job.id) && !isTrial(job.id)) pickAgain(job);
-});
-clock.watch(() => {
-  if (shown !== null && clock.end > clock.start && !clock.following) session.seek(clock.time);
-});
-
-mountLink();
-await readLibrary();
+// An address that asks for something is followed before anything is picked or drawn.
+const bare = location.hash === "";
+const rest = import("./stage.js");
+if (bare) {
+  mountPreview();
+  readLibrary();
+}
+(await rest).mountStage();
+if (!bare) {
+  mountPreview();
+  await readLibrary();
+}

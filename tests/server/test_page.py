@@ -23,9 +23,19 @@ def test_the_page_names_every_module_that_its_modules_import(live: Live):
             assert imported in named, f"{path} imports {imported}"
 
 
+def test_what_is_drawn_first_is_asked_for_first_and_styles_are_in_the_page(live: Live):
+    page = live.http.get("/").text
+    named = re.findall(r'rel="modulepreload" href="/static/([^"]+)"', page)
+    assert named.index("library/missions.js") < named.index("wire/api.js") < named.index("stage.js")
+    assert all(named.index(path) < named.index("stage.js") for path in assets._imported("main.js"))
+    assert 'rel="stylesheet"' not in page
+    for style in (assets.static_directory() / "style").glob("*.css"):
+        assert style.read_text(encoding="utf-8") in page, style
+
+
 def test_a_file_comes_compressed_and_only_once(live: Live):
     first = live.http.get("/static/main.js", headers={"accept-encoding": "gzip"})
-    assert first.headers["content-encoding"] == "gzip" and "mountPanes" in first.text
+    assert first.headers["content-encoding"] == "gzip" and "mountRooms" in first.text
     tag = first.headers["etag"]
     again = live.http.get("/static/main.js", headers={"accept-encoding": "gzip", "if-none-match": tag})
     assert again.status_code == 304 and again.content == b"" and again.headers["etag"] == tag
