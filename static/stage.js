@@ -4,6 +4,7 @@ import { mountScorecard } from "./claims/scorecard.js";
 import { mountHelp } from "./help.js";
 import { listenKeys } from "./keyboard.js";
 import { part } from "./look/dom.js";
+import { loadPlotly } from "./look/plotly.js";
 import { mountSchedule } from "./pursuit/schedule.js";
 import { mountRuns } from "./runs/runs.js";
 import { mountListening } from "./slam/listening.js";
@@ -30,6 +31,9 @@ import { mountTimeline } from "./workbench/timeline.js";
 import { mountToolbar } from "./workbench/toolbar.js";
 import { mountWhatIf } from "./whatif/panel.js";
 
+/** Plots keep frames waiting no longer than this once they can be drawn. */
+const PLOTS_MS = 1500;
+
 /** Mounts it, and follows the address. */
 export function mountStage() {
   mountWhatIf();
@@ -41,7 +45,7 @@ export function mountStage() {
 
   const panes = mountPanes(listenKeys);
   const session = new SceneSession({
-    scenes: (addresses) => panes.place(addresses),
+    scenes: (addresses) => afterPlots(() => panes.place(addresses)),
     camera: (pose) => paneState.set({ camera: pose }),
     error: (detail) => panes.fail(detail),
     link: (up) => (up ? store.set({ connected: true }) : suspect()),
@@ -87,4 +91,15 @@ export function mountStage() {
   });
 
   mountLink();
+}
+
+let waiting = null;
+
+/** Does the newest of such acts when the page has drawn its plots: frames that open keep it busy for a while. */
+async function afterPlots(act) {
+  waiting = act;
+  await loadPlotly().catch(() => {});
+  const go = () => waiting === act && act();
+  if (window.requestIdleCallback) requestIdleCallback(go, { timeout: PLOTS_MS });
+  else setTimeout(go);
 }
