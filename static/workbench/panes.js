@@ -42,7 +42,8 @@ export function mountPanes(keys) {
       // A frame that moves in the document loads again, so only what is out of place moves.
       if (grid.children[n] !== root) grid.insertBefore(root, grid.children[n] ?? null);
     });
-    const left = layout === "overlay" ? 0 : (job?.algorithms.length ?? 0) - names.length;
+    const without = (job?.algorithms ?? []).filter((name) => !hidden.algorithms.has(name) && !names.includes(name));
+    const left = layout === "overlay" ? 0 : without.length;
     note.hidden = !job || (hasWebGL && left <= 0);
     const more = left > 0 ? `${plural(left, "more estimator")} in the plots and the table: ${MOST_PANES} panes are the most a browser draws smoothly.` : "";
     note.textContent = hasWebGL ? more : `This browser draws no WebGL, so plans take the place of the 3D panes. Hardware acceleration or WebGL in its settings bring them back. ${more}`;

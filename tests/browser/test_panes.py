@@ -188,6 +188,7 @@ def test_six_panes_are_the_most_and_a_hidden_one_makes_room(page: Page, server: 
     page.locator(".chip[data-name=nekf]").click()
     expect(page.locator(".pane[data-algorithm=k_last][data-state=shown]")).to_be_visible()
     expect(page.locator(".pane")).to_have_count(6)
+    expect(page.locator("#panes .note")).to_be_hidden()
 
 
 def test_a_pane_that_went_while_it_waited_for_its_turn_keeps_no_other_waiting(page: Page, solo: str):
