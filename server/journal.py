@@ -16,6 +16,9 @@ BATCH_S = 0.03
 #: Pause before the next attempt where the disk is full, and how many events wait for it at most, the newest.
 AGAIN_S, MOST_WAITING = 1.0, 10_000
 
+#: Events read at a time.
+MOST_EVENTS = 100
+
 log = logging.getLogger(__name__)
 
 
@@ -78,18 +81,22 @@ class Journal:
 
         Ends where the job has ended, is deleted, or the server closes.
         """
+        running = False  # as far as events tell; where they tell of a state, or of nothing, the job is asked
         while not self.closing.is_set():
             news = self._news
-            found = self._store.job(job)
-            events = self._store.events(job, after)
+            found = None if running else self._store.job(job)
+            ended = not running and (found is None or found.state in FINAL)
+            events = self._store.events(job, after, MOST_EVENTS)
             for event in events:
                 yield event
                 after = event.id
-            if events:
-                continue
-            if found is None or found.state in FINAL:
+            if ended and len(events) < MOST_EVENTS:
                 return
+            asked, running = not running, bool(events) and all(event.kind != "state" for event in events)
+            if len(events) == MOST_EVENTS or not (running or asked) or (events and not running):
+                continue
             try:
                 await asyncio.wait_for(news.wait(), pause_s)
             except TimeoutError:
+                running = False
                 yield None

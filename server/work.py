@@ -50,7 +50,7 @@ class Stopped(Exception):
 
 
 #: Workers on the server's own machine leave the processor to the server when it wants it.
-NICENESS = 5
+NICENESS = 10
 
 
 class Prepared(WorkerPlugin):
