@@ -60,7 +60,7 @@ def fit(points: np.ndarray, angles: tuple[int, ...] = ()) -> Kde:
         raise ValueError(f"a kernel density needs at least two points, got {N}")
     apart = _away(points[:, None], points, angles)
     local = np.sort(np.abs(apart), axis=1)[:, max(N // 4, 1)].mean(0)
-    scale = np.maximum(local, 1e-9 * (1.0 + np.abs(points).max(0)))
+    scale = np.maximum(local, 1e-6 * (1.0 + np.abs(points).max(0)))
     squared = np.square(apart / scale).sum(-1)
     np.fill_diagonal(squared, np.inf)
 

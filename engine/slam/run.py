@@ -31,7 +31,7 @@ class Options(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     kernels: int = Field(100, ge=20, le=5000, description="kernels of each belief")
-    sweeps: int = Field(6, ge=1, le=100, description="moves of the kernels each time their weights are uneven")
+    sweeps: int = Field(4, ge=1, le=100, description="moves of the kernels each time their weights are uneven")
     measurements: int | None = Field(
         None, ge=1, le=5000, description="ranges or arrays used, evenly spread over those of the mission (none: all)"
     )

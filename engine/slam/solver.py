@@ -34,8 +34,8 @@ from engine.slam.variables import LABEL, Kind
 REFINERS = 10
 #: Sweeps for each that draws beacons anew; the others move them by differences between kernels.
 REDRAWS = 3
-#: Newton steps that settle the poses for a proposed beacon.
-SETTLINGS = 2
+#: Newton steps that settle the poses for a proposed beacon, and for new factors, at most.
+SETTLINGS, LONG_SETTLINGS = 2, 30
 #: How many times more kernels first look for a new beacon, all around.
 SCOUTS = 8
 #: Share of the kernels that must count; with fewer they are resampled and moved.
@@ -46,6 +46,8 @@ STEPS_M, OWN_STEPS = (0.02, 3.0), 0.3
 AT_ONCE = 16
 #: Distance (in each coordinate) below which a point of linearization is left where it is.
 SETTLED = 1e-3
+#: Change of all kernels' evidence with which their poses count as settled.
+SETTLED_NATS = 0.05
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class Solver:
     """Grows a graph and keeps its beliefs; the same seed and extensions give the same kernels."""
 
     def __init__(
-        self, kernels: int = 100, seed: int | np.random.SeedSequence = 0, sweeps: int = 6, lag: int | None = None
+        self, kernels: int = 100, seed: int | np.random.SeedSequence = 0, sweeps: int = 4, lag: int | None = None
     ) -> None:
         if kernels < 4:
             raise ValueError(f"a belief needs at least 4 kernels, got {kernels}")
@@ -101,7 +103,7 @@ class Solver:
             self._take(np.repeat(np.arange(wanted), SCOUTS))
         log_q = self._evidence + self._enter(kinds, added)
         self._grow(kinds, added)
-        self._evidence = self._settle()
+        self._evidence = self._settle(LONG_SETTLINGS)
         # Where a beacon has become determined, what its kernels' values were drawn by has no weight against others.
         placed = not before <= self._given
         self._log_weight = self._log_weight + (0.0 if placed else self._evidence - log_q)
@@ -227,7 +229,7 @@ class Solver:
     def _evidence_of(self, factors: list[Factor]) -> np.ndarray:
         """The evidence (N,) of these factors alone."""
         with self._only(factors):
-            return self._settle()
+            return self._settle(LONG_SETTLINGS)
 
     # -- evidence
 
@@ -241,22 +243,29 @@ class Solver:
             dict.fromkeys(v for f in self.graph.factors if not f.linear for v in f.variables if v not in self._given)
         )
 
-    def _settle(self) -> np.ndarray:
-        """Move the points of linearization to the mode of the poses given each kernel; the evidence (N,) there."""
+    def _settle(self, most: int = SETTLINGS) -> np.ndarray:
+        """Move the points of linearization to the mode of the poses given each kernel, in at most so many steps.
+
+        The evidence (N,) there. Away from the mode it is too high, so where a kernel's poses go to and fro between two
+        points (an array's records may fit two peaks each) it is that of the lesser.
+        """
         curved = self._curved()
-        for _ in range(SETTLINGS):
-            up = self._pass()
-            mean = down(self.graph, self.tree, up, self._given, self.kernels, None)
-            moved = False
-            for v in curved:
-                if np.abs(mean[v] - self._points.values[v]).max() > SETTLED:
-                    self._points.set(v, mean[v])
-                    moved = True
+        evidence = before = now = self._evidence_here()
+        for n in range(most):
+            mean = down(self.graph, self.tree, self._pass(), self._given, self.kernels, None)
+            moved = [v for v in curved if np.abs(mean[v] - self._points.values[v]).max() > SETTLED]
             if not moved:
                 break
-        else:
-            up = self._pass()
-        return np.broadcast_to(up.log_evidence, (self.kernels,)).copy()
+            for v in moved:
+                self._points.set(v, mean[v])
+            earlier, before, now = before, now, self._evidence_here()
+            evidence = np.minimum(before, now) if n else now
+            if min(np.abs(now - before).max(), np.abs(now - earlier).max() if n > 1 else np.inf) < SETTLED_NATS:
+                break
+        return evidence
+
+    def _evidence_here(self) -> np.ndarray:
+        return np.broadcast_to(self._pass().log_evidence, (self.kernels,)).copy()
 
     def _evenly(self) -> np.ndarray:
         """Numbers (N,) of kernels, each about as often as its weight says (systematic resampling)."""
@@ -297,7 +306,7 @@ class Solver:
             self._points.drop(v)
         self._propagation, self.tree = Propagation(), BayesTree([], {})
         self._grow({}, [])
-        self._evidence = self._settle()
+        self._evidence = self._settle(LONG_SETTLINGS)
 
     # -- moves
 

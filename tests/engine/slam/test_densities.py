@@ -99,3 +99,7 @@ def test_an_angle_on_both_sides_of_the_cut_is_one_mode():
     angles = np.random.default_rng(7).normal(np.pi, 0.1, (200, 1))
     kde = fit((angles + np.pi) % (2 * np.pi) - np.pi, angles=(0,))
     assert abs(abs(kde.mode[0]) - np.pi) < 0.1
+
+
+def test_kernels_in_one_place_are_as_near_a_gaussian_as_can_be_told():
+    assert 0.0 <= from_gaussian(fit(np.tile([12.3, -4.7], (100, 1))), np.random.default_rng(1)) < 0.1

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
 from engine.acoustics.matched_filter import matched_filter
 from engine.acoustics.synthetic_array import synthesize
+from engine.scenario import library, toml
+from engine.slam import sas_dynamic
+from engine.slam.building import growths
 from engine.slam.factors.factor import Factor
 from engine.slam.factors.synthetic_aperture import SyntheticAperture, synthetic_aperture
+from engine.slam.mission import fly
+from engine.slam.solver import Solver
 from tests.engine.acoustics.waters import SONAR, at, heard, line
 
 ELEMENTS = 8
@@ -103,3 +110,15 @@ def test_the_density_prefers_the_beacon_and_its_mirror_image(factor):
 def test_an_array_has_as_many_poses_as_records(factor):
     with pytest.raises(ValueError, match="8 elements cannot have 3 poses"):
         synthetic_aperture(("a", "b", "c"), "beacon", factor.array, 1.0, 0.2)
+
+
+@pytest.mark.parametrize("trial", [5, 8])
+def test_kernels_move_on_after_every_array(trial: int):
+    """Poses between two fixes settle slowly; kernels whose evidence were taken before they have would never be left."""
+    changes = {"arrays.count": 10, "fixes.count": 2, "ranging.count": 2, "options": {}}
+    mission = fly(toml.override(library.find("cheung2019-drifting"), changes), [trial])
+    solver = Solver(100, trial)
+    for growth in islice(growths(mission.log(0), sas_dynamic.PLAN, mission.time_s, 0.0), 5):
+        step = solver.extend(growth.kinds, growth.factors)
+        assert np.isnan(step.accepted) or step.accepted > 0.05
+        assert len(np.unique(solver.beliefs(["beacon"])["beacon"], axis=0)) > 50
