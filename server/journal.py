@@ -81,7 +81,7 @@ class Journal:
 
         Ends where the job has ended, is deleted, or the server closes.
         """
-        running = False  # as far as events tell; where they tell of a state, or of nothing, the job is asked
+        running = False  # known to run, since its last events told of no state: it need not be asked
         while not self.closing.is_set():
             news = self._news
             found = None if running else self._store.job(job)
@@ -90,10 +90,13 @@ class Journal:
             for event in events:
                 yield event
                 after = event.id
-            if ended and len(events) < MOST_EVENTS:
+            read_all = len(events) < MOST_EVENTS
+            if ended and read_all:
                 return
-            asked, running = not running, bool(events) and all(event.kind != "state" for event in events)
-            if len(events) == MOST_EVENTS or not (running or asked) or (events and not running):
+            # A job that was woken for and tells nothing may have been deleted.
+            in_doubt = running if not events else any(event.kind == "state" for event in events)
+            running = bool(events) and not in_doubt
+            if in_doubt or not read_all:
                 continue
             try:
                 await asyncio.wait_for(news.wait(), pause_s)

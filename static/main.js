@@ -19,14 +19,9 @@ mountAlgorithms();
 mountLaunch();
 
 // An address that asks for something is followed before anything is picked or drawn.
-const bare = location.hash === "";
+const asked = location.hash !== "";
 const rest = import("./stage.js");
-if (bare) {
-  mountPreview();
-  readLibrary();
-}
-(await rest).mountStage();
-if (!bare) {
-  mountPreview();
-  await readLibrary();
-}
+if (asked) (await rest).mountStage();
+mountPreview();
+readLibrary();
+if (!asked) (await rest).mountStage();

@@ -60,7 +60,7 @@ def fit(points: np.ndarray, angles: tuple[int, ...] = ()) -> Kde:
         raise ValueError(f"a kernel density needs at least two points, got {N}")
     apart = _away(points[:, None], points, angles)
     local = np.sort(np.abs(apart), axis=1)[:, max(N // 4, 1)].mean(0)
-    scale = np.maximum(local, 1e-6 * (1.0 + np.abs(points).max(0)))
+    scale = np.maximum(local, 1e-9 * (1.0 + np.abs(points).max(0)))
     squared = np.square(apart / scale).sum(-1)
     np.fill_diagonal(squared, np.inf)
 
@@ -76,7 +76,8 @@ def from_gaussian(kde: Kde, rng: np.random.Generator) -> float:
     """How far a belief is from the Gaussian of its moments (nats): the larger of both divergences (C19 eq. 5.3)."""
     mean = kde.points.mean(0)
     cov = np.cov(kde.points.T).reshape(len(mean), len(mean)) + np.diag(np.square(kde.bandwidth))
-    low = np.linalg.cholesky(cov)
+    # Kernels in two places leave a Gaussian that is flat across the line between them.
+    low = np.linalg.cholesky(cov + 1e-9 * np.trace(cov) * np.eye(len(mean)))
 
     def log_normal(at: np.ndarray) -> np.ndarray:
         z = np.linalg.solve(low, (at - mean).T)

@@ -249,23 +249,25 @@ class Solver:
         The evidence (N,) there. Away from the mode it is too high, so where a kernel's poses go to and fro between two
         points (an array's records may fit two peaks each) it is that of the lesser.
         """
-        curved = self._curved()
-        evidence = before = now = self._evidence_here()
+        curved, up = self._curved(), self._pass()
+        evidence = before = now = self._of_all(up)
         for n in range(most):
-            mean = down(self.graph, self.tree, self._pass(), self._given, self.kernels, None)
+            mean = down(self.graph, self.tree, up, self._given, self.kernels, None)
             moved = [v for v in curved if np.abs(mean[v] - self._points.values[v]).max() > SETTLED]
             if not moved:
                 break
             for v in moved:
                 self._points.set(v, mean[v])
-            earlier, before, now = before, now, self._evidence_here()
+            up = self._pass()
+            earlier, before, now = before, now, self._of_all(up)
             evidence = np.minimum(before, now) if n else now
             if min(np.abs(now - before).max(), np.abs(now - earlier).max() if n > 1 else np.inf) < SETTLED_NATS:
                 break
         return evidence
 
-    def _evidence_here(self) -> np.ndarray:
-        return np.broadcast_to(self._pass().log_evidence, (self.kernels,)).copy()
+    def _of_all(self, up: Up) -> np.ndarray:
+        """The evidence (N,) of a pass, for each kernel."""
+        return np.broadcast_to(up.log_evidence, (self.kernels,)).copy()
 
     def _evenly(self) -> np.ndarray:
         """Numbers (N,) of kernels, each about as often as its weight says (systematic resampling)."""
