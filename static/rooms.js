@@ -17,6 +17,7 @@ export function mountRooms() {
   }
   part("rooms").append(...links.values());
   store.watch(["room", "run"], ({ room, run }) => {
+    if (document.body.dataset.room !== room) part("stage").scrollTop = 0;
     document.body.dataset.room = room;
     for (const [name, link] of links) {
       if (name === room) link.setAttribute("aria-current", "page");

@@ -7,7 +7,7 @@ const ROW = 14;
 const SIDE = 150;
 const GRAPH = { width: 380, height: 112, margin: 12 };
 const TREE = { width: 380, height: 150, margin: 8 };
-const GROWTH = { width: 380, left: 44, right: 8, top: 16, errors: 78, between: 20, divergence: 40 };
+const GROWTH = { width: 380, left: 58, right: 8, top: 16, errors: 78, between: 20, divergence: 40 };
 /** What is shown of each measurement's errors: the field, and its name beside the line. */
 const ERRORS = { mean: "beacon, mean", mode: "beacon, densest place", poses: "poses, average" };
 
@@ -156,7 +156,7 @@ export function growth(moments, n) {
   panel(top, errors, Object.entries(lines).flatMap(([name, all]) => all.map((values) => ({ name, values }))), "m");
   panel(top + errors + between, divergence, nats.map((values) => ({ name: "nats", values })), "nats");
   drawn.push(svg("line", { x1: x(n), x2: x(n), y1: top, y2: height - 18, class: "now" }));
-  let at = left;
+  let at = 0;
   for (const [name, words] of Object.entries(ERRORS)) {
     drawn.push(svg("line", { x1: at, x2: at + 16, y1: 7, y2: 7, class: name }), svg("text", { x: at + 20, y: 10.5 }, words));
     at += 32 + 5.6 * words.length;

@@ -46,3 +46,13 @@ def test_a_measured_paper_needs_no_new_run(page: Page, server: Server):
     expect(mission.locator("summary .score")).to_have_text(re.compile(r"\d of \d hold"))
     mission.locator("summary").click()
     expect(mission.locator(".show").first).to_have_attribute("href", re.compile(f"run={run}"))
+
+
+def test_a_room_is_entered_at_its_top(page: Page, run: str):
+    page.goto(f"/#run={run}&layout=plan")
+    stage = page.locator("#stage")
+    page.locator("#table tbody tr").first.scroll_into_view_if_needed()
+    assert stage.evaluate("stage => stage.scrollTop") > 0
+    page.get_by_role("link", name="Claims", exact=True).click()
+    expect(page.get_by_role("region", name=PAPER)).to_be_in_viewport()
+    assert stage.evaluate("stage => stage.scrollTop") == 0
