@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,24 @@ TELL_S, SETTLE_S = 0.3, 20.0
 TURN_S = 3.0
 #: Poses closer than this (scene units) are the same.
 SAME = 0.01
+#: A pose is at least this far (of its distance) aside of straight above or below, so that it has a heading.
+STEEPEST = 0.01
+
+
+def pose_of(position: Sequence[float], look_at: Sequence[float], wxyz: Sequence[float]) -> np.ndarray:
+    """A viewer's pose (6,) from what it says of its camera: orientation `wxyz` of axes right, down and forward.
+
+    Of one that looks straight down only the orientation says which way is up on the screen: it is put a little aside.
+    """
+    offset = np.subtract(position, look_at)
+    least = STEEPEST * float(np.linalg.norm(offset))
+    if np.linalg.norm(offset[:2]) < least:
+        w, x, y, z = wxyz
+        up = np.array([w * z - x * y, x * x + z * z - 0.5])  # on the screen, east and north
+        length = float(np.linalg.norm(up))
+        if length > 0:
+            offset[:2] = -np.sign(offset[2]) * least / length * up
+    return np.concatenate([look_at + offset, look_at])
 
 
 class Cameras:

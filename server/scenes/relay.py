@@ -7,7 +7,6 @@ import contextlib
 import math
 
 import msgspec
-import numpy as np
 import websockets
 from fastapi import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import connect
@@ -15,6 +14,7 @@ from websockets.typing import Subprotocol
 
 from server.assets import viser_client
 from server.scenes import inner
+from server.scenes.cameras import pose_of
 from server.scenes.pane import Pane
 
 LARGEST = 4096
@@ -99,7 +99,7 @@ async def relay(viewer: WebSocket, pane: Pane) -> None:
                 data = message.get("bytes") or b""
                 said = permitted(data)
                 if said is not None:
-                    pane.said = np.array([*said.position, *said.look_at])
+                    pane.said = pose_of(said.position, said.look_at, said.wxyz)
                     await upstream.send(data)
 
         ways = [asyncio.create_task(down()), asyncio.create_task(up())]

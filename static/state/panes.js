@@ -44,7 +44,7 @@ export function paneNames(job, layout, hidden) {
 /** A camera as the address has it; null for the usual one. */
 function written(camera) {
   if (camera === null || camera.every((v, n) => Math.abs(v - USUAL_CAMERA[n]) < 0.05)) return null;
-  return camera.map((v) => Math.round(100 * v) / 100).join(",");
+  return camera.map((v) => Math.round(1000 * v) / 1000).join(",");
 }
 
 /** Keeps layout and camera in the address; `look(pose)` is told of a pose that an address asks for. */

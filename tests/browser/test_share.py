@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import tomllib
 from pathlib import Path
 
 import numpy as np
 from playwright.sync_api import Page, expect
 
-from tests.browser.serving import Server
+from tests.browser.eyes import difference, pixels, see_the_vehicles, settled
+from tests.browser.serving import Server, until
 
 
 def share(page: Page) -> None:
@@ -52,3 +54,44 @@ def test_numbers_and_scenario_of_the_open_run_are_saved_as_files(page: Page, ser
     assert np.load(io.BytesIO(saved["Tracks (NPZ)"]))["cekf/scout/mean"].shape[0] == 3
     assert tomllib.loads(saved["Scenario (TOML)"].decode())["trials"] == 3
     assert b"<!doctype html>" in saved["Report (HTML)"][:100].lower()
+
+
+def test_whoever_opens_a_copied_address_sees_the_same(page: Page, run: str):
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.goto(f"/#run={run}")
+    page.get_by_label("Panes", exact=True).select_option("Overlay")
+    see_the_vehicles(page, ["overlay"])
+    page.locator(".vehicle", has_text="ship").click()
+    page.locator(".chip[data-name=nekf]").click()
+    page.locator("#stage").focus()
+    page.keyboard.press("Home")
+    for _ in range(9):
+        page.keyboard.press("Shift+ArrowRight")
+    box = page.locator(".pane[data-algorithm=overlay] .view").bounding_box()
+    assert box
+    before = settled(page, "overlay")
+
+    def turned() -> bool:
+        page.mouse.move(box["x"] + 60, box["y"] + 60)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 200, box["y"] + 90, steps=4)
+        page.mouse.up()
+        return difference(before, pixels(page, "overlay")) > 0.025
+
+    until(turned, "the pane to turn")
+    expect(page).to_have_url(re.compile("camera="))
+    page.wait_for_timeout(2000)  # the camera is told when it has come to rest
+    seen = settled(page, "overlay")
+    share(page)
+    page.get_by_role("button", name="Copy the address").click()
+    expect(page.locator("#actions .word")).to_have_text("The address is copied.")
+    address = page.evaluate("navigator.clipboard.readText()")
+
+    other = page.context.new_page()
+    other.goto(address)
+    expect(other.locator(".now")).to_have_text(page.locator(".now").inner_text())
+    expect(other.get_by_role("radio", name="ship", exact=True)).to_be_checked()
+    expect(other.get_by_label("Panes", exact=True)).to_have_value("overlay")
+    expect(other.locator(".chip[data-name=nekf]")).to_have_attribute("aria-pressed", "false")
+    # Two pages smooth their lines differently: a likeness, not a copy.
+    until(lambda: difference(seen, pixels(other, "overlay")) < 0.02, "the same picture")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import itertools
 import json
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -14,12 +15,13 @@ import msgspec
 import numpy as np
 import pytest
 import viser
+from scipy.spatial.transform import Rotation
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from server.problems import Refusal
 from server.scenes import palette, relay
-from server.scenes.cameras import ABOVE, OBLIQUE
+from server.scenes.cameras import ABOVE, OBLIQUE, pose_of
 from server.scenes.sessions import Sessions
 from tests.server.living import PATIENCE_S, SHORT, Live, until
 
@@ -33,10 +35,10 @@ class Session:
     def say(self, **message: Any) -> None:
         self.socket.send(json.dumps(message))
 
-    def hear(self, kind: str) -> dict[str, Any]:
+    def hear(self, kind: str, patience_s: float = PATIENCE_S) -> dict[str, Any]:
         """The next message of a kind; those of other kinds are passed over."""
         while True:
-            message = json.loads(self.socket.recv(timeout=PATIENCE_S))
+            message = json.loads(self.socket.recv(timeout=patience_s))
             if message["type"] == kind:
                 return message
             assert message["type"] != "error", message
@@ -200,6 +202,22 @@ def test_the_other_panes_follow_the_camera_of_one(live: Live, job: str):
                 return clients[1].camera.position.tolist() == place
 
             until(dragged, "the other pane's camera")
+
+
+@pytest.mark.parametrize("height", [9.0, -9.0])
+@pytest.mark.parametrize("heading_deg", [0.0, 75.0, 180.0, 290.0])
+def test_a_view_from_straight_above_or_below_keeps_its_heading(heading_deg: float, height: float):
+    heading = np.array([np.sin(np.radians(heading_deg)), np.cos(np.radians(heading_deg)), 0.0])
+    target, forward = np.array([2.0, -3.0, 0.5]), np.array([0.0, 0.0, -np.sign(height)])
+    axes = np.column_stack([np.cross(forward, heading), -heading, forward])
+    wxyz = Rotation.from_matrix(axes).as_quat(scalar_first=True)
+    pose = pose_of(target + [0.0, 0.0, height], target, wxyz)
+    assert np.abs(pose - [*target + [0.0, 0.0, height], *target]).max() < 0.1, "next to where it is"
+    looking = pose[3:] - pose[:3]
+    upright = [0.0, 0.0, 1.0] - looking * looking[2] / (looking @ looking)
+    np.testing.assert_allclose(upright[:2] / np.linalg.norm(upright[:2]), heading[:2], atol=1e-6)
+    aside = target + [1.0, -2.0, height]
+    np.testing.assert_array_equal(pose_of(aside, target, wxyz), [*aside, *target])
 
 
 def test_panes_close_with_their_session(live: Live, job: str):
@@ -367,12 +385,15 @@ def test_free_cameras_do_not_follow_and_a_camera_at_rest_is_told(live: Live, job
             start = OBLIQUE[:3].tolist()
             for client in clients:
                 until(lambda client=client: client.camera.position.tolist() == start, "the common start")
-            for socket in (one, other):
-                socket.send(camera(position=tuple(start)))
 
             def told() -> bool:
-                one.send(camera(position=(4.0, 5.0, 6.0)))
-                return mine.hear("camera")["pose"][:3] == [4.0, 5.0, 6.0]
+                """A viewer is heard once it has been seen where it was sent to."""
+                for place in (start, [4.0, 5.0, 6.0]):
+                    one.send(camera(position=tuple(place)))
+                    time.sleep(0.1)
+                with suppress(TimeoutError):
+                    return mine.hear("camera", patience_s=1.0)["pose"][:3] == [4.0, 5.0, 6.0]
+                return False
 
             until(told, "the camera's place")
             assert clients[1].camera.position.tolist() == start
