@@ -1,6 +1,6 @@
 """Tables 5.1 to 5.4 of Cheung's thesis, row group by row group: the thesis' errors and ours over ten seeds.
 
-Run `python -m tests.benchmarks.cheung2019_tables` for all of them (about an hour and a half on one core), or name tables:
+Run `python -m tests.benchmarks.cheung2019_tables` for all of them (an hour and a half on one core), or name tables:
 `... 5.1 5.3`. A row group is what the thesis' rows share: experiment, fixes, measurements, array length and drift.
 """
 
