@@ -11,6 +11,7 @@ from importlib.metadata import version
 import anyio.to_thread
 from fastapi import FastAPI
 from starlette.middleware.gzip import GZipMiddleware
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from engine import registry
 from server import problems, recovery
@@ -40,6 +41,18 @@ async def _prepare(ready: asyncio.Event) -> None:
     await ready.wait()
     await asyncio.to_thread(registry.algorithms)
     await asyncio.to_thread(inner.prepare)
+
+
+class Heads:
+    """ASGI middleware: HEAD is answered as GET is, and the connection leaves the body out."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and scope["method"] == "HEAD":
+            scope = {**scope, "method": "GET"}
+        await self.app(scope, receive, send)
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -88,4 +101,5 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(GZipMiddleware, minimum_size=2000, compresslevel=5)
     app.add_middleware(Guard, settings=settings)
     app.add_middleware(Meter, tally=tally)
+    app.add_middleware(Heads)
     return app

@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 dask.config.set({"distributed.deploy.lost-worker-timeout": "1000 days"})
 
 #: Pause between attempts to reach somebody's cluster.
-AGAIN_S = 1.0
+AGAIN_S = 0.3
 #: The cluster is looked at this often, besides being told of changes.
 LOOK_S = 0.5
 #: A run that was stopped has this long to leave its worker; then the worker is started again.

@@ -81,16 +81,26 @@ export function mountStage() {
   store.watch(["job", "hidden"], showScenes);
   paneState.watch(["layout"], showScenes);
   let picked = null;
-  store.watch(["job", "missions"], ({ job, missions }) => {
+  // What a person says of the next run while one that was asked for comes stays.
+  let before = null;
+  store.watch(["run"], ({ asked, varied }) => (before = { asked, varied }));
+  store.watch(["job", "missions"], ({ job, missions, asked, varied }) => {
     if (!job || missions === null || job.id === picked) return;
     picked = job.id;
-    if (!startedByForm(job.id) && !isTrial(job.id)) pickAgain(job);
+    if (!startedByForm(job.id) && !isTrial(job.id) && asked === before.asked) pickAgain(job, saidSince(before.varied, varied));
   });
   clock.watch(() => {
     if (shown !== null && clock.end > clock.start && !clock.following) session.seek(clock.time);
   });
 
   mountLink();
+}
+
+/** What of a new run's variation was said since another one. */
+function saidSince(before, varied) {
+  const said = Object.fromEntries(["trials", "seed"].filter((key) => varied[key] !== before[key]).map((key) => [key, varied[key]]));
+  const changes = Object.entries(varied.changes).filter(([key, value]) => value !== before.changes[key]);
+  return { ...said, changes: Object.fromEntries(changes) };
 }
 
 let waiting = null;

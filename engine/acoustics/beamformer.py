@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import CZT
 
 from engine.acoustics.sonar import Sonar
-from engine.acoustics.zoom import band_frequencies
+from engine.acoustics.zoom import band_frequencies, chirp_z
 
 #: Spacing of the tabulated correlations, s: their cubic interpolation is then off by less than 5e-7 at 2050 Hz.
 LAG_STEP_S = 8e-6
@@ -102,7 +101,7 @@ def correlate(spectra: np.ndarray, sonar: Sonar, reach_s: float) -> Correlations
     reach_s = half * LAG_STEP_S
     i, j = np.triu_indices(m, 1)
     cross = spectra[i] * np.conj(spectra[j])
-    to_lags = CZT(K, 2 * half + 1, w=np.exp(2j * np.pi * (f[1] - f[0]) * LAG_STEP_S), a=1.0)
+    to_lags = chirp_z(K, 2 * half + 1, w=np.exp(2j * np.pi * (f[1] - f[0]) * LAG_STEP_S), a=1.0)
     lag = LAG_STEP_S * np.arange(-half, half + 1)
     back = np.exp(-2j * np.pi * (f - f[0]) * reach_s)
     carrier = np.exp(2j * np.pi * f[0] * lag)

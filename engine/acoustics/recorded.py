@@ -6,7 +6,6 @@ import struct
 from pathlib import Path
 
 import numpy as np
-from scipy.io import wavfile
 
 from engine.acoustics.sonar import Sonar
 from engine.scenario.errors import Problem, ScenarioError
@@ -76,6 +75,8 @@ def _samples(path: Path, sonar: Sonar, key: str, channel: int) -> np.ndarray:
 
 
 def _wav(path: Path, sonar: Sonar, key: str, channel: int) -> np.ndarray:
+    from scipy.io import wavfile  # brings MATLAB's formats with it, a tenth of a second
+
     rate, found = wavfile.read(path)
     if rate != sonar.sampling_hz:
         raise _fault(key, f"{path.name} is sampled at {rate} Hz, the sonar at {sonar.sampling_hz:g}", "make them equal")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from scipy.signal import CZT
 
 from engine.acoustics.sonar import Sonar
 
@@ -23,5 +24,12 @@ def zoom_transform(signals: np.ndarray, sonar: Sonar, bins: int = BINS) -> np.nd
     """
     step = (sonar.high_hz - sonar.low_hz) / (bins * sonar.sampling_hz)
     start = sonar.low_hz / sonar.sampling_hz
-    transform = CZT(signals.shape[-1], bins, w=np.exp(-2j * np.pi * step), a=np.exp(2j * np.pi * start))
-    return transform(signals, axis=-1)
+    transform = chirp_z(signals.shape[-1], bins, w=np.exp(-2j * np.pi * step), a=np.exp(2j * np.pi * start))
+    return transform(signals)
+
+
+def chirp_z(n: int, bins: int, w: complex, a: complex) -> Callable[[np.ndarray], np.ndarray]:
+    """The chirp z-transform of signals (..., n) to (..., bins): at a * w**-k of the z-plane, k = 0 to bins - 1."""
+    from scipy.signal import CZT  # with all that it brings half a second, which missions without sound need not wait
+
+    return CZT(n, bins, w=w, a=a)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from engine.slam.variables import wrap
 
@@ -54,6 +53,8 @@ def fit(points: np.ndarray, angles: tuple[int, ...] = ()) -> Kde:
     Their ratio between dimensions is that of the spreads of neighbours, which a distribution of several modes or
     along a ring does not stretch as its covariance would be.
     """
+    from scipy.optimize import minimize_scalar  # a quarter of a second, which missions without kernels need not wait
+
     points = np.asarray(points, dtype=float)
     N, d = points.shape
     if N < 2:

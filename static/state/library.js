@@ -58,10 +58,11 @@ export function pickMission(name, ticked = null, varied = store.state.mission ==
   });
 }
 
-/** Picks what a run that is opened was made of, so that it can be varied and run again. */
-export function pickAgain(job) {
+/** Picks what a run that is opened was made of, so that it can be varied and run again; `said` is varied already. */
+export function pickAgain(job, said = { changes: {} }) {
   const known = store.state.missions?.some((m) => m.name === job.scenario && m.available);
-  if (known) pickMission(job.scenario, job.algorithms, { trials: job.trials, seed: job.seed, changes: job.changes });
+  const made = { trials: job.trials, seed: job.seed, ...said, changes: { ...job.changes, ...said.changes } };
+  if (known) pickMission(job.scenario, job.algorithms, made);
 }
 
 /** Algorithms that can run a mission, in the registry's order. */

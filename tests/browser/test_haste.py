@@ -24,6 +24,29 @@ def test_what_is_typed_before_the_library_is_read_stays(page: Page):
     assert (body["trials"], body["seed"], body["set"]) == (2, 5, {"network.loss": 0.75})
 
 
+def test_what_is_typed_while_a_run_of_the_address_comes_stays(page: Page, run: str):
+    release = held(page, f"**/api/jobs/{run}")
+    page.goto(f"/#run={run}&layout=plan")
+    expect(page.locator("#run")).to_be_enabled()
+    page.locator("#field-seed").fill("5")
+    page.locator("[id='field-network.loss']").fill("0.75")
+    release()
+    page.locator("#table tbody tr").first.wait_for()
+    expect(page.locator("#field-trials")).to_have_value("3")
+    expect(page.locator("#field-seed")).to_have_value("5")
+    expect(page.locator("[id='field-network.loss']")).to_have_value("0.75")
+
+
+def test_a_mission_picked_while_a_run_of_the_address_comes_stays(page: Page, run: str):
+    release = held(page, f"**/api/jobs/{run}")
+    page.goto(f"/#run={run}&layout=plan")
+    mission = page.locator(".mission[data-name=walls2012-two-node]")
+    mission.click()
+    release()
+    page.locator("#table tbody tr").first.wait_for()
+    expect(mission.locator("input")).to_be_checked()
+
+
 def test_a_field_that_is_emptied_shows_the_missions_own_again(page: Page):
     page.goto("/")
     trials = page.locator("#field-trials")

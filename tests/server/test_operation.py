@@ -218,3 +218,14 @@ def test_a_body_does_not_wait_until_its_head_is_acknowledged(tmp_path: Path):
         return not at_once
 
     assert not asyncio.run(delayed())
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/api/health", "/api/jobs/{id}/result", "/static/main.js", "/api/jobs/nosuchjob"]
+)
+def test_head_tells_what_get_would_bring(live: Live, path: str):
+    path = path.format(id=live.done(SHORT)["id"])
+    head, get = live.http.head(path), live.http.get(path)
+    assert (head.status_code, head.content) == (get.status_code, b"")
+    assert head.headers["content-type"] == get.headers["content-type"]
+    assert live.http.head(path).status_code == get.status_code, "the connection goes on"
