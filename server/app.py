@@ -96,7 +96,8 @@ def create_app(settings: Settings) -> FastAPI:
         default_response_class=Json,
     )
     problems.install(app)
-    for room in (health, algorithms, scenarios, logs, jobs, marks, tables, tracking, scenes, docs, page):
+    # A request is tried on their routes one by one: those that are asked for most come first.
+    for room in (health, jobs, page, scenes, algorithms, scenarios, marks, tables, logs, tracking, docs):
         app.include_router(room.router, responses=problems.ANSWERS)
     app.add_middleware(GZipMiddleware, minimum_size=2000, compresslevel=5)
     app.add_middleware(Guard, settings=settings)

@@ -32,7 +32,7 @@ class Site:
     tally: Tally
 
 
-def _site(connection: HTTPConnection) -> Site:
+async def _site(connection: HTTPConnection) -> Site:  # what is not async has its turn in a thread, every time
     return connection.app.state.site
 
 

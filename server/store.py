@@ -7,7 +7,7 @@ import sqlite3
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +110,7 @@ class Job:
     def public(self) -> dict[str, Any]:
         """The job as REST shows it."""
         hidden = {"toml", "digest", "origin", "idempotency_key", "client"}
-        return {k: v for k, v in asdict(self).items() if k not in hidden}
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in hidden}
 
 
 @dataclass(frozen=True)

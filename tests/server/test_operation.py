@@ -11,7 +11,9 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +22,10 @@ import pytest
 from uvicorn.protocols.utils import ClientDisconnected
 
 from server import logs, serving
+from server.app import MOST_THREADS
 from server.cli import main
 from server.doctor import findings
+from server.results import Results
 from server.settings import Settings
 from tests.server.living import PATIENCE_S, SHORT, Live, start, until
 
@@ -229,3 +233,22 @@ def test_head_tells_what_get_would_bring(live: Live, path: str):
     assert (head.status_code, head.content) == (get.status_code, b"")
     assert head.headers["content-type"] == get.headers["content-type"]
     assert live.http.head(path).status_code == get.status_code, "the connection goes on"
+
+
+def test_health_answers_while_every_thread_is_at_work(live: Live, monkeypatch: pytest.MonkeyPatch):
+    gate, at_work = threading.Event(), threading.Semaphore(0)
+
+    def slow(self: Results, id: str) -> None:
+        at_work.release()
+        gate.wait(PATIENCE_S)
+
+    monkeypatch.setattr(Results, "view", slow)
+    with ThreadPoolExecutor(MOST_THREADS) as readers:
+        reading = [readers.submit(httpx.get, f"{live.url}/api/jobs/any/view") for _ in range(MOST_THREADS)]
+        try:
+            assert all(at_work.acquire(timeout=PATIENCE_S) for _ in reading)
+            assert httpx.get(f"{live.url}/api/health", timeout=PATIENCE_S / 4).json()["ready"]
+            assert httpx.get(f"{live.url}/static/main.js", timeout=PATIENCE_S / 4).status_code == 200
+        finally:
+            gate.set()
+        assert {answer.result().status_code for answer in reading} == {204}
