@@ -116,7 +116,8 @@ class Rig:
 
         def answers() -> bool:
             with contextlib.suppress(httpx.TransportError):
-                return httpx.get(f"{self.url}/api/health/ready", timeout=5).status_code == 200
+                # By a client that is there: to make one takes as much of a core as the server needs to begin.
+                return self.http.get("/api/health/ready", timeout=5).status_code == 200
             return False
 
         until(answers, "a server that is ready")

@@ -37,9 +37,7 @@ def submit(rig: Rig, n: int) -> str:
 
     def asked() -> str | None:
         with contextlib.suppress(httpx.TransportError):
-            answer = httpx.post(
-                f"{rig.url}/api/jobs", json=body(n), headers={"idempotency-key": f"job-{n}"}, timeout=10
-            )
+            answer = rig.http.post("/api/jobs", json=body(n), headers={"idempotency-key": f"job-{n}"}, timeout=10)
             if answer.status_code == 202:
                 return answer.json()["id"]
             assert answer.status_code in (429, 503), answer.text
@@ -52,7 +50,7 @@ def submit(rig: Rig, n: int) -> str:
 def done(rig: Rig) -> int:
     """How many jobs are done; none while the server is away."""
     with contextlib.suppress(httpx.TransportError):
-        return sum(job["state"] == "done" for job in httpx.get(f"{rig.url}/api/jobs", timeout=10).json())
+        return sum(job["state"] == "done" for job in rig.http.get("/api/jobs", timeout=10).json())
     return 0
 
 
