@@ -198,7 +198,10 @@ def test_the_other_panes_follow_the_camera_of_one(live: Live, job: str):
                 until(lambda client=client: client.camera.position.tolist() == start, "the common start")
 
             def dragged() -> bool:
-                one.send(camera(position=tuple(place)))
+                """A viewer is heard once it has been seen where it was sent to."""
+                for there in (start, place):
+                    one.send(camera(position=tuple(there)))
+                    time.sleep(0.1)
                 return clients[1].camera.position.tolist() == place
 
             until(dragged, "the other pane's camera")
