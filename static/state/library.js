@@ -59,7 +59,7 @@ export function pickMission(name, ticked = null, varied = store.state.mission ==
 }
 
 /** Picks what a run that is opened was made of, so that it can be varied and run again; `said` is varied already. */
-export function pickAgain(job, said = { changes: {} }) {
+export function pickAgain(job, said) {
   const known = store.state.missions?.some((m) => m.name === job.scenario && m.available);
   const made = { trials: job.trials, seed: job.seed, ...said, changes: { ...job.changes, ...said.changes } };
   if (known) pickMission(job.scenario, job.algorithms, made);
