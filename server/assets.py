@@ -39,16 +39,17 @@ class Asset:
     tag: str
 
 
+@cache
 def static_directory() -> Path:
     """The page's files: beside this package in an installed wheel, at the top of a checkout otherwise."""
     here = Path(__file__).resolve().parent
     inside = here / "static"
-    return inside if inside.is_dir() else here.parent / "static"
+    return (inside if inside.is_dir() else here.parent / "static").resolve()
 
 
 def static_file(path: str) -> Asset | None:
     """A file of the page by its path in the folder, as it is now; None where there is none."""
-    root = static_directory().resolve()
+    root = static_directory()
     file = root if "\0" in path else (root / path).resolve()
     if not file.is_relative_to(root) or file.suffix not in TYPES or not file.is_file():
         return None

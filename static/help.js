@@ -21,6 +21,9 @@ const STEPS = [
 
 const SEEN = "coopnav.tour";
 
+/** Ends the tour that is shown. */
+let endTour = () => {};
+
 export function mountHelp() {
   part("help").append(el("button", { type: "button", class: "icon", "aria-label": "Help", title: "Keys and first steps (?)", onclick: openHelp }, "?"));
   window.addEventListener("keydown", (event) => {
@@ -55,7 +58,7 @@ function openHelp() {
 }
 
 function startTour() {
-  document.querySelector(".tour")?.remove();
+  endTour();
   const title = el("h2", { id: "tour-title" });
   const text = el("p", {});
   const count = el("span", { class: "count" });
@@ -69,8 +72,13 @@ function startTour() {
     el("div", { class: "buttons" }, count, el("button", { type: "button", onclick: end }, "Skip"), back, next),
   );
   let step = 0;
+  endTour = end;
   part("stage").append(card);
-  card.addEventListener("keydown", (event) => event.key === "Escape" && end());
+  const over = new AbortController();
+  const leave = (event) => {
+    if (event.key === "Escape" && !event.defaultPrevented && !document.querySelector("dialog[open]")) end();
+  };
+  window.addEventListener("keydown", leave, { signal: over.signal });
   part("tab-new").click();
   go(0);
 
@@ -89,6 +97,8 @@ function startTour() {
   }
 
   function end() {
+    endTour = () => {};
+    over.abort();
     mark(null);
     card.remove();
     remember();

@@ -38,7 +38,8 @@ export function mountMissions() {
     if (event.key === "Enter") {
       event.preventDefault();
       shelf.querySelector(".mission:not([hidden], .missing) input")?.click();
-    } else if (event.key === "Escape") {
+    } else if (event.key === "Escape" && search.value) {
+      event.stopPropagation();
       search.value = "";
       find();
     }

@@ -45,9 +45,18 @@ def test_a_question_mark_opens_the_keys_and_leads_to_the_first_steps(page: Page,
     expect(sheet).to_have_count(0)
     page.get_by_role("button", name="Help").click()
     sheet.get_by_role("button", name="First steps").click()
-    expect(page.locator(".tour")).to_contain_text("1 of 3")
-    page.locator(".tour").get_by_role("button", name="Skip").click()
-    expect(page.locator(".tour")).to_have_count(0)
+    tour, search = page.locator(".tour"), page.locator("#find-mission")
+    expect(tour).to_contain_text("1 of 3")
+    tour.get_by_role("button", name="Skip").click()
+    expect(tour).to_have_count(0)
+    page.get_by_role("button", name="Help").click()
+    sheet.get_by_role("button", name="First steps").click()
+    search.fill("range")
+    search.press("Escape")
+    expect(search).to_have_value("")
+    expect(tour).to_contain_text("1 of 3")  # the search had that Escape
+    search.press("Escape")
+    expect(tour).to_have_count(0)
 
 
 def library(page: Page, run: str) -> None:
