@@ -18,6 +18,7 @@ from engine import registry, runner
 from engine.evaluation.claims import check
 from engine.evaluation.result import SCHEMA, capacity, packet_figures
 from engine.evaluation.summary import Summary
+from engine.notes import Note, join
 from engine.registry import Progress, silent
 from engine.scenario.models import ScenarioBase
 from engine.tracks import PacketCount, Reference, Tracks
@@ -45,18 +46,18 @@ class Batch:
 
 @dataclass(frozen=True)
 class Total:
-    """What an algorithm left over a number of trials, by subject; notes are kept once."""
+    """What an algorithm left over a number of trials, by subject; what was noted is told once."""
 
     summaries: dict[str, Summary]
     packets: PacketCount
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     cpu_s: float
 
     def __add__(self, other: Total) -> Total:
         return Total(
             {subject: summary + other.summaries[subject] for subject, summary in self.summaries.items()},
             self.packets + other.packets,
-            tuple(dict.fromkeys(self.notes + other.notes)),
+            join(self.notes + other.notes),
             self.cpu_s + other.cpu_s,
         )
 
@@ -99,7 +100,7 @@ def of_tracks(reference: Reference, answers: dict[str, Tracks]) -> Totals:
         name: Total(
             {s: Summary.of(reference.truth.get(s), belief, best.get(s)) for s, belief in tracks.beliefs.items()},
             tracks.packets,
-            tracks.notes,
+            join(tracks.notes),
             tracks.cpu_s,
         )
         for name, tracks in answers.items()
@@ -122,7 +123,7 @@ def told(scenario: ScenarioBase, time_s: Any, totals: Totals, lost: Sequence[dic
             "subjects": {subject: summary.metrics() for subject, summary in total.summaries.items()},
             "packets": packet_figures(total.packets, capacity(scenario)),
             "cpu_s": total.cpu_s,
-            "notes": list(total.notes),
+            "notes": [str(note) for note in total.notes],
         }
         for name, total in totals.items()
     }

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from engine.notes import Note, join
+
 
 @dataclass(frozen=True)
 class Belief:
@@ -86,7 +88,7 @@ class Tracks:
     samples: dict[str, Samples] = field(default_factory=dict)
     innovations: dict[str, Innovations] = field(default_factory=dict)
     series: dict[str, Series] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note | str, ...] = ()
     cpu_s: float = 0.0
     graph: dict[str, Any] = field(default_factory=dict)
 
@@ -113,37 +115,37 @@ def stack_references(blocks: list[tuple[Reference, int]]) -> Reference:
 
 
 def stack(blocks: list[Tracks]) -> Tracks:
-    """Join the answers of consecutive blocks of trials along the trial axis; notes are kept once."""
+    """Join the answers of consecutive blocks of trials along the trial axis; what was noted is told once."""
     first = blocks[0]
     if len(blocks) == 1:
         return first
 
-    def join(arrays: list[np.ndarray]) -> np.ndarray:
+    def stacked(arrays: list[np.ndarray]) -> np.ndarray:
         return np.concatenate(arrays, axis=0)
 
     return Tracks(
         beliefs={
-            s: Belief(join([b.beliefs[s].mean for b in blocks]), join([b.beliefs[s].cov for b in blocks]))
+            s: Belief(stacked([b.beliefs[s].mean for b in blocks]), stacked([b.beliefs[s].cov for b in blocks]))
             for s in first.beliefs
         },
         packets=sum((b.packets for b in blocks), PacketCount()),
         samples={
-            s: Samples(first.samples[s].time_s, join([b.samples[s].points for b in blocks])) for s in first.samples
+            s: Samples(first.samples[s].time_s, stacked([b.samples[s].points for b in blocks])) for s in first.samples
         },
         innovations={
             s: Innovations(
                 i.time_s,
-                join([b.innovations[s].value for b in blocks]),
-                join([b.innovations[s].variance for b in blocks]),
-                join([b.innovations[s].accepted for b in blocks]),
+                stacked([b.innovations[s].value for b in blocks]),
+                stacked([b.innovations[s].variance for b in blocks]),
+                stacked([b.innovations[s].accepted for b in blocks]),
             )
             for s, i in first.innovations.items()
         },
         series={
-            k: Series(s.title, s.unit, join([b.series[k].value for b in blocks]), s.subjects)
+            k: Series(s.title, s.unit, stacked([b.series[k].value for b in blocks]), s.subjects)
             for k, s in first.series.items()
         },
-        notes=tuple(dict.fromkeys(n for b in blocks for n in b.notes)),
+        notes=join(n for b in blocks for n in b.notes),
         cpu_s=sum(b.cpu_s for b in blocks),
         graph=first.graph,
     )

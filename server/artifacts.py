@@ -15,6 +15,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from engine import notes
 from engine.evaluation.result import Result
 from engine.evaluation.summary import Spread, Summary
 from engine.runner import Shard
@@ -125,7 +126,7 @@ def write_totals(path: Path, totals: Totals) -> str:
     arrays: dict[str, np.ndarray] = {}
     meta = []
     for n, (name, total) in enumerate(totals.items()):
-        rest = {"packets": asdict(total.packets), "notes": list(total.notes), "cpu_s": total.cpu_s}
+        rest = {"packets": asdict(total.packets), "notes": [note.plain() for note in total.notes], "cpu_s": total.cpu_s}
         meta.append(rest | {"name": name, "subjects": list(total.summaries)})
         for k, summary in enumerate(total.summaries.values()):
             for key, value in vars(summary).items():
@@ -152,8 +153,13 @@ def read_totals(path: Path) -> Totals:
             for k, subject in enumerate(rest["subjects"])
         }
         packets = PacketCount(**rest["packets"])
-        totals[rest["name"]] = Total(summaries, packets, tuple(rest["notes"]), rest["cpu_s"])
+        totals[rest["name"]] = Total(summaries, packets, _notes(rest["notes"]), rest["cpu_s"])
     return totals
+
+
+def _notes(written: list[Any]) -> tuple[notes.Note, ...]:
+    """Notes as they were written; as words alone by earlier versions."""
+    return tuple(notes.of_plain([note] if isinstance(note, str) else note) for note in written)
 
 
 def _plain(value: np.ndarray) -> Any:
@@ -172,7 +178,7 @@ def write_shard(path: Path, shard: Shard, reference: Reference, tracks: Tracks) 
         "innovations": list(tracks.innovations),
         "series": [[key, s.title, s.unit, list(s.subjects)] for key, s in tracks.series.items()],
         "packets": asdict(tracks.packets),
-        "notes": list(tracks.notes),
+        "notes": [note.plain() for note in notes.join(tracks.notes)],
         "cpu_s": tracks.cpu_s,
         "graph": tracks.graph,
     }
@@ -209,7 +215,7 @@ def read_shard(path: Path) -> tuple[Shard, Reference, Tracks]:
             key: Series(title, unit, arrays[f"series/{n}"], tuple(subjects))
             for n, (key, title, unit, subjects) in enumerate(meta["series"])
         },
-        notes=tuple(meta["notes"]),
+        notes=_notes(meta["notes"]),
         cpu_s=meta["cpu_s"],
         graph=meta.get("graph", {}),
     )

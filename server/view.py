@@ -114,7 +114,7 @@ def _algorithm(
         "subjects": {s: _subject(reference.truth.get(s), belief, keep, first) for s, belief in tracks.beliefs.items()},
         "series": {key: _series(series, keep) for key, series in tracks.series.items()},
         "surprise": {s: _surprise(seen, span) for s, seen in tracks.innovations.items()},
-        "notes": list(tracks.notes),
+        "notes": [str(note) for note in tracks.notes],
         "graph": first and "graphs" in tracks.graph,
         "schedule": first and "slots" in tracks.graph,
         "sound": first and "moments" in tracks.graph,

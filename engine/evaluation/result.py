@@ -97,7 +97,7 @@ def _algorithms(
             "subjects": metrics[name],
             "packets": packet_figures(answer.packets, capacity_bps),
             "cpu_s": answer.cpu_s,
-            "notes": list(answer.notes),
+            "notes": [str(note) for note in answer.notes],
         }
         for name, answer in tracks.items()
     }

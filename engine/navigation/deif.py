@@ -31,6 +31,7 @@ from engine.navigation.mission import Arrival, Launch, NavigationMission
 from engine.navigation.network import Member, Packet, run_nodes, slant_to_horizontal
 from engine.navigation.ranging import Innovation
 from engine.navigation.served import ServedFilter, only_in
+from engine.notes import Least, Note
 from engine.registry import Algorithm, Progress
 from engine.tracks import Tracks
 
@@ -242,10 +243,12 @@ class DeifNode:
     def belief(self) -> Moments:
         return self.client.belief()
 
-    def notes(self) -> list[str]:
+    def notes(self) -> list[Note]:
         return [
-            f"lost a packet of {self.member.names[sender]} in {int(broken.sum())} of {broken.size} trials, first after "
-            f"{self.first_break.get(sender, 0.0):.0f} s; its ranges were not used from then on"
+            Note(
+                "lost a packet of {} in {} trials, first after {:.0f} s; its ranges were not used from then on",
+                *(self.member.names[sender], int(broken.sum()), Least(self.first_break.get(sender, 0.0))),
+            )
             for sender, broken in self.broken.items()
             if broken.any()
         ]

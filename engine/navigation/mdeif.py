@@ -34,6 +34,7 @@ from engine.navigation.mission import Arrival, Launch, NavigationMission
 from engine.navigation.network import Member, Packet, correlation_of, run_nodes, slant_to_horizontal
 from engine.navigation.ranging import Innovation
 from engine.navigation.served import ServedFilter, only_in
+from engine.notes import Note
 from engine.registry import Algorithm, Progress
 from engine.tracks import Tracks
 
@@ -397,21 +398,26 @@ class MdeifNode:
         """Correlation of the last launch with its origin (W12 Fig. 5)."""
         return {f"origin_correlation/{self.member.log.name}": self.server.correlation}
 
-    def notes(self) -> list[str]:
+    def notes(self) -> list[Note]:
         notes = []
         for sender, count in self.skipped.items():
             if count.any():
                 notes.append(
-                    f"skipped {int(count.sum())} packets of {self.member.names[sender]} in {int((count > 0).sum())} "
-                    f"trials: their origin was too old to recover the step from"
+                    Note(
+                        "skipped {} packets of {} in {} trials: their origin was too old to recover the step from",
+                        *(int(count.sum()), self.member.names[sender], int((count > 0).sum())),
+                    )
                 )
         for sender, count in self.restarted.items():
             notes.append(
-                f"began again {int(count.sum())} times with {self.member.names[sender]}, which hears no "
-                f"acknowledgement and had to reset its origin"
+                Note(
+                    "began again {} times with {}, which hears no acknowledgement and had to reset its origin",
+                    *(int(count.sum()), self.member.names[sender]),
+                )
             )
         if self.server.resets.any():
-            notes.append(f"reset its origin {int(self.server.resets.sum())} times: nobody acknowledges its packets")
+            resets = int(self.server.resets.sum())
+            notes.append(Note("reset its origin {} times: nobody acknowledges its packets", resets))
         return notes
 
 

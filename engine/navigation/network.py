@@ -8,7 +8,7 @@ centralized benchmark is one object that is told of every vehicle's links and ev
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -19,6 +19,7 @@ from engine.mission.log import VehicleLog
 from engine.navigation.chains import Step
 from engine.navigation.mission import Arrival, Launch, NavigationMission, Report
 from engine.navigation.ranging import Innovation, horizontal_range
+from engine.notes import Note, join
 from engine.registry import Progress
 from engine.tracks import Belief, Innovations, PacketCount, Series, Tracks
 
@@ -71,7 +72,7 @@ class Node(Protocol):
         """Own position belief, (trials, 2) and (trials, 2, 2)."""
         ...
 
-    def notes(self) -> list[str]:
+    def notes(self) -> Sequence[Note | str]:
         """What the person running this should know."""
         ...
 
@@ -89,7 +90,7 @@ class Fleet(Protocol):
 
     def correlation(self, first: int, second: int) -> np.ndarray: ...
 
-    def notes(self) -> list[str]: ...
+    def notes(self) -> Sequence[Note | str]: ...
 
 
 def members(mission: NavigationMission) -> list[Member]:
@@ -158,7 +159,7 @@ def run_nodes(
         belief=lambda v: nodes[v].belief(),
         curves=curves,
     )
-    notes = [f"{m.log.name}: {n}" for m, node in zip(members(mission), nodes) for n in node.notes()]
+    notes = [n.about(m.log.name) for m, node in zip(members(mission), nodes) for n in join(node.notes())]
     time = PacketCount(mission_s=mission.trials * mission.log.duration_s)
     return recorder.tracks(sum(counts, time), notes)
 
@@ -230,7 +231,7 @@ class _Recorder:
                 if seen is not None:
                     self.innovations[event.vehicle].append((event.time_s, seen))
 
-    def tracks(self, packets: PacketCount, notes: list[str]) -> Tracks:
+    def tracks(self, packets: PacketCount, notes: Sequence[Note | str]) -> Tracks:
         names = [v.name for v in self.mission.log.vehicles]
         innovations = {
             names[v]: Innovations(

@@ -69,7 +69,7 @@ class Diary:
         self.surprises.append(surprise)
 
 
-def tracks(diary: Diary, water: Water, tracker: Tracker, packets: PacketCount, notes: tuple[str, ...] = ()) -> Tracks:
+def tracks(diary: Diary, water: Water, tracker: Tracker, packets: PacketCount) -> Tracks:
     """The target as every vehicle knows it, where the vehicles went, and the figures of C19 section 3.4 as series.
 
     Where one station holds the estimate, it is every vehicle's.
@@ -90,7 +90,7 @@ def tracks(diary: Diary, water: Water, tracker: Tracker, packets: PacketCount, n
             unit = UNITS.get(key.rpartition("_")[2], "1")
             series[f"{key}/{name}"] = Series(f"{title} of {name}", unit, value, (subject(name),))
         heard[subject(name)] = innovations(end_s, diary.surprises, int(h))
-    return Tracks(beliefs=beliefs, packets=packets, innovations=heard, series=series, notes=notes)
+    return Tracks(beliefs=beliefs, packets=packets, innovations=heard, series=series)
 
 
 def _figures(diary: Diary, h: int) -> dict[str, tuple[str, np.ndarray]]:

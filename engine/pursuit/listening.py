@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from engine.gaussian.forms import Moments
+from engine.notes import Note
 from engine.pursuit.arrivals import Surprise
 from engine.pursuit.diary import innovations
 from engine.pursuit.mission import PursuitMission
@@ -81,7 +82,7 @@ def run_multilateration(mission: PursuitMission, progress: Progress) -> Tracks:
     cov = np.where(known[..., None, None], found.cov[trial, chosen, :2, :2], first.cov[:, None, :2, :2])
     progress(1.0, None)
     lost = int((~good).sum())
-    notes = (f"{lost} of {good.size} pings gave no position.",) if lost else ()
+    notes = (Note("{} pings gave no position", lost),) if lost else ()
     return _tracks(mission, Moments(mean, cov), notes)
 
 
@@ -123,7 +124,7 @@ def _chosen(mission: PursuitMission, options: FilterChoice) -> list[int]:
 def _tracks(
     mission: PursuitMission,
     belief: Moments,
-    notes: tuple[str, ...],
+    notes: tuple[Note, ...],
     heard: tuple[np.ndarray, list[Surprise]] | None = None,
 ) -> Tracks:
     """The one estimate, as every vehicle's that pursues."""

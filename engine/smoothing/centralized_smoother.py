@@ -15,6 +15,7 @@ from engine.navigation.cekf import CekfFleet
 from engine.navigation.mission import Arrival, Launch, NavigationMission, Report
 from engine.navigation.network import members
 from engine.navigation.ranging import horizontal_range
+from engine.notes import Most, Note
 from engine.registry import Algorithm, Progress
 from engine.smoothing.ambiguity import WIDE_M, Judged, likeliest, starts
 from engine.smoothing.band import BandInverse
@@ -317,14 +318,16 @@ def run(mission: NavigationMission, progress: Progress) -> Tracks:
         progress((trial + 1) / trials, _partial(mission, names, mean, cov) if trial == 0 else None)
     notes = []
     if unsettled:
-        notes.append(f"least squares did not settle in {len(unsettled)} of {trials} trials")
+        notes.append(Note("least squares did not settle in {} trials", len(unsettled)))
     if ambiguous:
         notes.append(
-            f"ambiguous in {len(ambiguous)} of {trials} trials: another solution, up to {max(ambiguous):.0f} m "
-            "away, fits the ranges nearly as well"
+            Note(
+                "ambiguous in {} trials: another solution, up to {:.0f} m away, fits the ranges nearly as well",
+                *(len(ambiguous), Most(max(ambiguous))),
+            )
         )
     if refused:
-        notes.append(f"refused {refused} ranges as gross errors")
+        notes.append(Note("refused {} ranges as gross errors", refused))
     return Tracks(
         beliefs={name: Belief(mean[v], cov[v]) for v, name in enumerate(names)},
         innovations=ranges.innovations(names),

@@ -18,6 +18,7 @@ from engine.navigation.chains import XY, Step
 from engine.navigation.mission import Arrival, Launch
 from engine.navigation.network import Member, Packet
 from engine.navigation.ranging import Innovation, horizontal_range
+from engine.notes import Note
 from engine.smoothing.band import NotPositiveDefinite
 from engine.smoothing.composition import Relation, decompose, oplus
 from engine.smoothing.composition import compose as then
@@ -346,10 +347,10 @@ class SmootherNode:
         """What the vehicle knows of its position now, from everything that arrived until now."""
         return Moments(self.now.mean[..., XY], self.now.cov[..., XY, XY])
 
-    def notes(self) -> list[str]:
+    def notes(self) -> list[Note]:
         if not self.lost_ranges:
             return []
-        return [f"left out {self.lost_ranges} ranges to launches about which too little was received"]
+        return [Note("left out {} ranges to launches about which too little was received", self.lost_ranges)]
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,7 @@ def test_one_that_hears_nothing_reckons_on_and_says_so(name):
     mission = fly(scenario(duration_s=45.0, ranging=counts, arrays={"count": 0 if counts["count"] else 2}), [0, 1])
     tracks = algorithm(name).run(mission, silent)
     assert set(tracks.beliefs) == {"auv"} and np.isfinite(tracks.beliefs["auv"].cov).all()
-    assert any("beacon was not heard" in note for note in tracks.notes)
+    assert any("beacon was not heard" in str(note) for note in tracks.notes)
 
 
 def test_what_is_streamed_has_a_row_of_every_subject_at_every_moment(told):

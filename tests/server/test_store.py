@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from engine.notes import join
 from engine.runner import Shard
 from engine.tracks import Belief, Innovations, PacketCount, Reference, Samples, Series, Tracks
 from server import artifacts
@@ -129,7 +130,7 @@ def test_a_finished_shard_is_read_back_exactly(tmp_path: Path):
     artifacts.write_shard(tmp_path / "s.npz", shard, reference, tracks)
     shard_, reference_, tracks_ = artifacts.read_shard(tmp_path / "s.npz")
     assert shard_ == shard and tracks_.packets == tracks.packets
-    assert (tracks_.notes, tracks_.cpu_s) == (tracks.notes, tracks.cpu_s)
+    assert (tracks_.notes, tracks_.cpu_s) == (join(tracks.notes), tracks.cpu_s)
     np.testing.assert_array_equal(reference_.time_s, reference.time_s)
     for subject in reference.truth:
         np.testing.assert_array_equal(reference_.truth[subject], reference.truth[subject])

@@ -25,7 +25,7 @@ def solved(name: str, water: dict) -> Tracks:
 
 
 def doubts(tracks: Tracks) -> list[str]:
-    return [note for note in tracks.notes if "do not fit" in note]
+    return [str(note) for note in tracks.notes if "do not fit" in str(note)]
 
 
 def finite(tracks: Tracks) -> bool:
