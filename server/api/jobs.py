@@ -115,9 +115,9 @@ async def events(id: str, here: Here, last_event_id: Annotated[str, Header()] = 
 
 
 @router.get("/jobs/{id}/result", response_class=Response)
-def result(id: str, here: Here) -> Response:
+async def result(id: str, here: Here) -> Response:
     """result.json of a finished job."""
-    # At once and not by FileResponse, each of whose reads is a thread's turn: it is small, and asked for often.
+    # Here and now: it is small and asked for often, and a thread's turn would take longer than reading it.
     text = here.jobs.results.artifact(id, artifacts.RESULT).read_bytes()
     return Response(text, media_type="application/json")
 

@@ -69,8 +69,8 @@ def test_a_job_on_a_full_disk_fails_in_words_and_leaves_nothing_half_written(fra
         patched.setattr(artifacts, "write_arrays", full)
         told = frail.finished(frail.submit(MANY)["id"])
     assert told["state"] == "failed" and told["error"]["title"] == "The disk is full"
-    left = {p.name for p in (frail.settings.data / "jobs" / told["id"]).iterdir()}
-    assert left <= {RECORD, "outline.json"}
+    folder = frail.settings.data / "jobs" / told["id"]
+    until(lambda: {p.name for p in folder.iterdir()} == {RECORD, "outline.json"}, "nothing but the record")
     frail.done(SHORT)
 
 
