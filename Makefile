@@ -15,10 +15,10 @@ SOAK ?= full
 serve: $(VENV)/.installed
 	$(BIN)/coopnav serve $(SERVE_ARGS)
 
-# The engine's tests on all cores; the server's and the page's need the cores themselves.
+# The engine's and the server's tests on all cores; those of the page need the cores themselves.
 test: $(VENV)/.installed-test browser
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist loadfile tests/engine $(PYTEST_ARGS)
-	$(BIN)/pytest tests/server tests/browser $(PYTEST_ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist loadfile tests/engine tests/server $(PYTEST_ARGS)
+	$(BIN)/pytest tests/browser $(PYTEST_ARGS)
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check engine server tests

@@ -35,6 +35,9 @@ from engine.notes import Least, Note
 from engine.registry import Algorithm, Progress
 from engine.tracks import Tracks
 
+#: A larger number in a packet (or none at all) is no figure of a link.
+LARGEST = 1e30
+
 
 class Options(BaseModel):
     """What a scenario may choose for the DEIF, under [options.deif]."""
@@ -69,17 +72,17 @@ def pack_link(link: Link, trials: int, layout: np.dtype) -> np.ndarray:
 
 
 def unpack_link(record: np.ndarray) -> tuple[Link, np.ndarray]:
-    """Records (trials,) back to a link, and which of them are a proper one: finite, C and J not negative."""
+    """Records (trials,) back to a link, and which of them are a proper one: of some size, C and J not negative."""
     n = record["b"].shape[-1]
     upper = np.triu_indices(n)
     full = {}
     for name in ("C", "J"):
         matrix = np.zeros((len(record), n, n))
-        matrix[:, upper[0], upper[1]] = matrix[:, upper[1], upper[0]] = record[name]
+        matrix[:, upper[0], upper[1]] = matrix[:, upper[1], upper[0]] = as_float(record[name])
         full[name] = matrix
-    A, b, eta = (record[name].astype(float) for name in ("A", "b", "eta"))
+    A, b, eta = (as_float(record[name]) for name in ("A", "b", "eta"))
     flat = [A.reshape(len(record), -1), b, eta, *(m.reshape(len(record), -1) for m in full.values())]
-    proper = np.logical_and.reduce(np.isfinite(np.concatenate(flat, axis=-1)), axis=-1)
+    proper = np.logical_and.reduce(np.abs(np.concatenate(flat, axis=-1)) < LARGEST, axis=-1)
     for name in ("C", "J"):
         matrix = np.where(proper[:, None, None], full[name], 0.0)
         values, vectors = np.linalg.eigh(matrix)
@@ -87,6 +90,12 @@ def unpack_link(record: np.ndarray) -> tuple[Link, np.ndarray]:
         clipped = (vectors * np.maximum(values, 0.0)[:, None, :]) @ transpose(vectors)
         full[name] = np.where((values[:, 0] < 0)[:, None, None], clipped, matrix)
     return only_in(proper, Link(A, b, full["C"], eta, full["J"])), proper
+
+
+def as_float(sent: np.ndarray) -> np.ndarray:
+    """What was sent as doubles, also where it is no number."""
+    with np.errstate(invalid="ignore"):
+        return sent.astype(float)
 
 
 class FullServer:
@@ -233,9 +242,9 @@ class DeifNode:
         for age in reversed(range(self.options.redundancy)):
             link, proper = unpack_link(packet.record["deltas"][:, age])
             now = usable & (gap > age)
-            broken |= now & ~proper
-            usable &= proper | ~now
-            self.client.integrate(sender, link, now & proper)
+            added = self.client.integrate(sender, link, now & proper)
+            broken |= now & ~added
+            usable &= added | ~now
         last[usable] = sequence[usable]
         range_m = slant_to_horizontal(arrival, packet.record["depth"] * packets.DEPTH_STEP_M)
         return self.client.update(sender, np.where(usable, range_m, np.nan))

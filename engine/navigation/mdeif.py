@@ -361,9 +361,10 @@ class MdeifNode:
         begun = valid & (graph.last < 0)
         fixed = self.member.sizes[sender] == 2
         link, stepped = _proper(*self._step(graph, s, origin, valid & ~begun, fixed))
-        self.skipped[sender] = self.skipped.get(sender, np.zeros(trials, int)) + (valid & ~begun & ~stepped)
         start = from_nothing(keep(s, slice(0, n)))
-        self.client.integrate(sender, _where(begun, start, link), begun | stepped)
+        added = self.client.integrate(sender, _where(begun, start, link), begun | stepped)
+        begun, stepped = begun & added, stepped & added
+        self.skipped[sender] = self.skipped.get(sender, np.zeros(trials, int)) + (valid & ~begun & ~stepped)
         graph.extend(link, sequence, origin, stepped)
         graph.begin(s, sequence, origin, begun)
         usable = begun | stepped

@@ -17,6 +17,13 @@ from engine.navigation.chains import XY, Step
 from engine.navigation.network import Member
 from engine.navigation.ranging import Innovation, update_range
 
+#: A Gaussian whose mean or standard deviation is so large, m, m/s or rad, is not of this world.
+FARTHEST = 1e7
+#: Variance times information of one state: beyond that a double does not keep both.
+DIGITS = 1e14
+#: Share of a standardized covariance that may be missing by round-off.
+ROUND_OFF = 1e-6
+
 
 class ServedFilter:
     """Own state, then one block per server heard so far, trials along the leading axis."""
@@ -41,10 +48,26 @@ class ServedFilter:
             self.servers[sender] = slice(n, n + size)
         return self.servers[sender]
 
-    def integrate(self, sender: int, link: Link, trials: np.ndarray) -> None:
-        """Add a server's delta information in the given trials (mask): its block moves to the new launch."""
+    def integrate(self, sender: int, link: Link, trials: np.ndarray) -> np.ndarray:
+        """Add a server's delta information in the given trials (mask): its block moves to the new launch.
+
+        Returns the trials in which it did: a packet that was changed on its way may have a right checksum, and what
+        would not leave a Gaussian of this world is not added.
+        """
         block = self.servers[sender]
-        self.joint = advance(self.joint, block, only_in(trials, link))
+        with np.errstate(over="ignore", invalid="ignore"):
+            try:
+                moved = advance(self.joint, block, only_in(trials, link))
+            except np.linalg.LinAlgError:  # in one of the trials, which must not spoil the others
+                known = np.einsum("...ii->...", self.joint.cov[..., block, block])
+                trials = trials & (known * np.einsum("...ii->...", link.J) < DIGITS)
+                moved = advance(self.joint, block, only_in(trials, link))
+        added = trials & _proper(moved)
+        self.joint = Moments(
+            np.where(added[:, None], moved.mean, self.joint.mean),
+            np.where(added[:, None, None], moved.cov, self.joint.cov),
+        )
+        return added
 
     def update(self, sender: int, range_m: np.ndarray) -> Innovation:
         """Condition on the range to a server's launch state (W11 eq. 6); NaN where there is none."""
@@ -73,6 +96,21 @@ class ServedFilter:
     def belief(self) -> Moments:
         """Own position belief."""
         return Moments(self.joint.mean[..., XY], self.joint.cov[..., XY, XY])
+
+
+def _proper(joint: Moments) -> np.ndarray:
+    """In which trials a joint Gaussian is one: finite, of this world, its covariance without negative directions."""
+    variance = np.einsum("...ii->...i", joint.cov)
+    proper = np.isfinite(joint.cov).all(axis=(-1, -2)) & (np.abs(joint.mean) < FARTHEST).all(axis=-1)
+    proper &= ((variance >= 0) & (variance < FARTHEST**2)).all(axis=-1)
+    sigma = np.sqrt(np.where(proper[:, None] & (variance > 0), variance, 1.0))
+    standard = np.where(proper[:, None, None], joint.cov / (sigma[:, :, None] * sigma[:, None, :]), 0.0)
+    floor = ROUND_OFF * np.eye(standard.shape[-1])
+    try:
+        np.linalg.cholesky(standard + floor)
+    except np.linalg.LinAlgError:
+        proper &= np.linalg.eigvalsh(standard)[:, 0] > -ROUND_OFF
+    return proper
 
 
 def only_in(trials: np.ndarray, link: Link) -> Link:
