@@ -241,6 +241,10 @@ def _ranges(rows: Sheet, source: RangesFile, scenario: NavigationScenario, offse
     if source.tol is not None:
         tol = rows.numbers(source.tol)
         tol = tol / PER_SECOND[source.time_unit] if source.time_unit != "s" else tol
+        early = np.flatnonzero(tol > toa)
+        if early.size:
+            message = f"{tol[early[0]]:.17g} s is after its arrival at {toa[early[0]]:.17g} s"
+            raise rows.fault(int(early[0]), source.tol, message, "give both on one clock, or leave the column out")
     senders = _who(rows, source, source.sender, source.sender_column, scenario)
     receivers = _who(rows, source, source.receiver, source.receiver_column, scenario)
     numbers = rows.text(source.broadcast) if source.broadcast is not None else [str(i) for i in range(count)]

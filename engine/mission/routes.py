@@ -63,6 +63,10 @@ class Track:
     turning: float
 
 
+#: A corner cut by less is not cut, m.
+SHARPEST_M = 1e-9
+
+
 def lawnmower_corners(path: LawnMower) -> np.ndarray:
     """Ends of the lines (2 lines, 2) in order of travel."""
     a = np.radians(path.heading_deg)
@@ -79,7 +83,7 @@ def rounded(points: np.ndarray, radius: float, *, closed: bool) -> Track:
     """Legs through points (N, 2), every corner rounded by an arc that fits between the middles of its legs.
 
     A closed track starts at the first point, cuts that corner like the others when it comes round, and goes on.
-    Where the way leads straight back the heading turns on the spot.
+    Where the way leads straight back, or an arc would be shorter than anything, the heading turns on the spot.
     """
     if closed:
         points = np.concatenate([points, points[:1]])
@@ -93,7 +97,7 @@ def rounded(points: np.ndarray, radius: float, *, closed: bool) -> Track:
     turn = (np.diff(course) + np.pi) % (2 * np.pi) - np.pi
     half = np.tan(np.minimum(np.abs(turn), np.pi - 1e-6) / 2)
     cut = np.minimum(radius * half, 0.5 * np.minimum(lengths[:-1], lengths[1:]))
-    cut[np.abs(turn) > np.pi - 1e-6] = 0.0
+    cut[(np.abs(turn) > np.pi - 1e-6) | (cut < SHARPEST_M)] = 0.0
 
     pieces: list[tuple[float, np.ndarray, float, float]] = []
     s, heading, into = 0.0, float(course[0]), 0.0

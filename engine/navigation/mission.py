@@ -79,7 +79,8 @@ class NavigationMission:
 def prepare(log: Log, options: Mapping[str, Mapping[str, Any]] | None = None) -> NavigationMission:
     """Compress every vehicle's log between the instants that concern it, and order the channel's events.
 
-    At one instant, what was heard counts before what is said, and both before the report.
+    At one instant, what was heard counts before what is said, and both before the report; but nothing is heard before
+    it is said, be the log's times ever so coarse.
     """
     acoustics = log.acoustics
     events: list[tuple[float, int, int, Event]] = []
@@ -93,13 +94,13 @@ def prepare(log: Log, options: Mapping[str, Mapping[str, Any]] | None = None) ->
             b = int(acoustics.broadcast[r])
             sender = int(acoustics.sender[b])
             arrival = Arrival(float(acoustics.toa_s[r]), b, v, sender, slant[:, r], depth[:, n], last[b] == r)
-            events.append((arrival.time_s, 0, int(r), arrival))
+            events.append((arrival.time_s, 0 if arrival.time_s > acoustics.tol_s[b] else 2, int(r), arrival))
         mine = np.flatnonzero(acoustics.sender == v)
         depth = depth_at(vehicle, acoustics.tol_s[mine])
         for n, b in enumerate(mine):
             launch = Launch(float(acoustics.tol_s[b]), int(b), v, depth[:, n], audience[b])
             events.append((launch.time_s, 1, int(b), launch))
-    events += [(float(t), 2, k, Report(float(t), k)) for k, t in enumerate(log.time_s)]
+    events += [(float(t), 3, k, Report(float(t), k)) for k, t in enumerate(log.time_s)]
     events.sort(key=lambda e: e[:3])
     ordered = tuple(e[3] for e in events if e[0] <= log.duration_s)
 

@@ -15,6 +15,7 @@ from engine.mission.csv_log import degrees_of
 from engine.mission.log import Log
 from engine.navigation.mission import prepare
 from engine.scenario import library, toml
+from engine.scenario.errors import ScenarioError
 
 
 def again(scenario, folder: Path) -> tuple[Log, Log]:
@@ -90,6 +91,32 @@ def test_the_folder_is_a_scenario_of_one_recorded_trial(tmp_path):
     assert scenario.trials == 1 and scenario.claims == []
     assert scenario.mission.kind == "recorded"  # type: ignore[attr-defined]
     assert scenario.algorithms == SIMULATED.algorithms
+
+
+def coarse(folder: Path, late_s: float) -> Log:
+    """SIMULATED, its launches written down as late_s after their arrivals, read again."""
+    again(SIMULATED, folder)
+    file = folder / "log" / "ranges.csv"
+    header, *rows = (line.split(",") for line in file.read_text().splitlines())
+    arrival = {row[0]: float(row[2]) for row in reversed(rows)}  # the first of each broadcast
+    for row in rows:
+        row[1] = repr(arrival[row[0]] + late_s)
+    file.write_text("\n".join(",".join(row) for row in [header, *rows]) + "\n")
+    return fly(library.find(str(folder / "log")), [0])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["cekf", "nekf", "deif", "mdeif", "k_best", "centralized_smoother"])
+def test_a_log_whose_packets_arrive_at_the_instant_of_their_launch_is_borne(tmp_path, name):
+    """Where times are written in whole seconds they often do."""
+    log = coarse(tmp_path, 0.0)
+    assert np.any(log.acoustics.toa_s == log.acoustics.tol_s[log.acoustics.broadcast])
+    tracks = registry.algorithm(name).run(prepare(log), registry.silent)
+    assert np.isfinite(tracks.beliefs["iver28"].mean).all()
+
+
+def test_a_launch_after_its_arrival_is_refused_with_its_row(tmp_path):
+    with pytest.raises(ScenarioError, match=r"ranges.csv line 2, column 'tol_s'.*after its arrival.*one clock"):
+        coarse(tmp_path, 0.5)
 
 
 def test_a_folder_with_a_scenario_is_not_written_over(tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from engine.mission.routes import lawnmower_corners, route
@@ -53,6 +53,7 @@ def test_a_vehicle_keeps_its_speed(path):
     assert step.max() <= path.speed_mps * 0.5 * (1 + 1e-5)
 
 
+@example([(0, 0), (0, 1), (1, 0)], 1e-309, False)
 @given(
     st.lists(st.tuples(st.integers(-50, 50), st.integers(-50, 50)), min_size=2, max_size=8),
     st.floats(0, 30),
