@@ -2,7 +2,7 @@
 
 import { el, part, say } from "../look/dom.js";
 import { clockTime } from "../look/format.js";
-import { close, menu } from "../look/menu.js";
+import { close as closeMenu, menu } from "../look/menu.js";
 import { loadPlotly } from "../look/plotly.js";
 import { sample } from "../look/swatch.js";
 import { clock } from "../state/clock.js";
@@ -68,7 +68,7 @@ export function buildPlot(quantity, settings, changed) {
   }
 
   async function save(format) {
-    close(keep);
+    closeMenu(keep);
     await savePlot(format, plotted());
   }
 

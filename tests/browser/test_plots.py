@@ -209,6 +209,8 @@ def saved(page: Page, quantity: str, format: str) -> Path:
     with page.expect_download() as download:
         plot(page, quantity).get_by_role("button", name=format, exact=True).click()
     assert download.value.suggested_filename == f"first-look-scout-{quantity}.{format.lower()}"
+    expect(plot(page, quantity).locator("details")).not_to_have_attribute("open", "")
+    expect(plot(page, quantity).locator(".js-line").first).to_be_visible()  # it is still there
     return Path(download.value.path())
 
 
