@@ -62,7 +62,7 @@ def check_every_algorithm(scenario: ScenarioBase) -> None:
     json.loads(dumps(result.to_json()), parse_constant=lambda word: pytest.fail(f"{word} in JSON"))
 
 
-@settings(QUICK, max_examples=15)  # each takes ten seconds
+@settings(QUICK, max_examples=10)  # each takes ten seconds and more
 @given(scenarios())
 def test_every_algorithm_bears_every_scenario(scenario: ScenarioBase):
     note(toml.dumps(scenario))

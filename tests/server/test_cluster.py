@@ -16,6 +16,7 @@ from distributed.scheduler import TaskGroup
 from distributed.security import Security
 
 from engine import runner
+from server.cluster import PROCESSES
 from server.settings import Settings
 from tests.server.living import SHORT, Live, start, until
 
@@ -72,13 +73,11 @@ def test_the_scheduler_keeps_nothing_of_jobs_that_are_done(live: Live):
         gc.collect()
         return sum(type(thing) is TaskGroup for thing in gc.get_objects())
 
-    few, many = 6, 18  # more jobs than are remembered on purpose
-    for seed in range(few):
+    remembered = PROCESSES["distributed.diagnostics.computations.max-history"]
+    before = kept()  # other clusters of this process have theirs
+    for seed in range(3 * remembered):
         live.done(SHORT | {"seed": seed})
-    after_few = kept()
-    for seed in range(few, many):
-        live.done(SHORT | {"seed": seed})
-    until(lambda: kept() <= after_few + 1, f"no more than {after_few} groups of tasks in memory", 20)
+    until(lambda: kept() <= before + remembered + 1, f"no more than {remembered} groups of tasks in memory", 20)
 
 
 def test_a_cluster_that_does_not_answer_is_told_and_jobs_wait(tmp_path: Path):
