@@ -235,8 +235,6 @@ class DeifNode:
         gap = sequence - last
         usable = packet.valid & ~broken & (gap > 0)
         lost = usable & (gap > self.options.redundancy)
-        if lost.any():
-            self.first_break.setdefault(sender, arrival.time_s)
         broken |= lost
         usable &= ~lost
         for age in reversed(range(self.options.redundancy)):
@@ -245,6 +243,8 @@ class DeifNode:
             added = self.client.integrate(sender, link, now & proper)
             broken |= now & ~added
             usable &= added | ~now
+        if broken.any():
+            self.first_break.setdefault(sender, arrival.time_s)
         last[usable] = sequence[usable]
         range_m = slant_to_horizontal(arrival, packet.record["depth"] * packets.DEPTH_STEP_M)
         return self.client.update(sender, np.where(usable, range_m, np.nan))
@@ -256,7 +256,7 @@ class DeifNode:
         return [
             Note(
                 "lost a packet of {} in {} trials, first after {:.0f} s; its ranges were not used from then on",
-                *(self.member.names[sender], int(broken.sum()), Least(self.first_break.get(sender, 0.0))),
+                *(self.member.names[sender], int(broken.sum()), Least(self.first_break[sender])),
             )
             for sender, broken in self.broken.items()
             if broken.any()

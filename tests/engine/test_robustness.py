@@ -18,6 +18,7 @@ from engine import registry, runner
 from engine.mission import csv_log, fly
 from engine.navigation import packets
 from engine.navigation.network import Packet
+from engine.notes import Least, Note
 from engine.scenario import library, toml
 from engine.scenario.errors import ScenarioError
 from engine.scenario.models import ScenarioBase
@@ -177,7 +178,10 @@ def check_damaged_packets(name: str, seed: int, rate: float, honest_checksum: bo
 
     scenario = toml.override(library.shipped("first-look"), {"duration_s": 300, "trials": 2, "network.loss": 0.0})
     with mock.patch.object(Packet, "__init__", tampered):
-        check_tracks(name, runner.run_shard(scenario, runner.Shard(name, TRIALS))[1])
+        tracks = runner.run_shard(scenario, runner.Shard(name, TRIALS))[1]
+    check_tracks(name, tracks)
+    firsts = [f for note in tracks.notes if isinstance(note, Note) for f in note.figures if isinstance(f, Least)]
+    assert all(first_s > 0 for first_s in firsts), "a packet takes time"
     return changed
 
 
