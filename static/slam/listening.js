@@ -3,6 +3,7 @@
 import { el, part, say } from "../look/dom.js";
 import { number, plural } from "../look/format.js";
 import { lineSample } from "../look/swatch.js";
+import { keptChoice } from "../state/choice.js";
 import { clock } from "../state/clock.js";
 import { store } from "../state/store.js";
 import { graph, growth, icicle, polar, waterfall } from "./figures.js";
@@ -10,12 +11,12 @@ import { listeners, momentAt, momentsOf } from "./story.js";
 
 export function mountListening() {
   const room = part("listening");
-  const choice = el("select", { "aria-label": "Estimator", onchange: () => read(choice.value) });
+  const choice = keptChoice("heard", "Estimator", read);
   const swatch = el("span", {});
   const step = (direction, label, sign) => el("button", { type: "button", class: "small", "aria-label": label, title: label, onclick: () => seek(direction) }, sign);
   const words = el("p", { class: "words", role: "status" });
   const figures = el("div", { class: "figures" });
-  room.append(el("div", { class: "heading" }, el("h2", {}, "Measurements"), choice, swatch, step(-1, "Previous measurement", "‹ factor"), step(1, "Next measurement", "factor ›")), words, figures);
+  room.append(el("div", { class: "heading" }, el("h2", {}, "Measurements"), choice.root, swatch, step(-1, "Previous measurement", "‹ factor"), step(1, "Next measurement", "factor ›")), words, figures);
 
   let moments = [];
   let shown = -2;
@@ -27,18 +28,18 @@ export function mountListening() {
     if (key === wanted) return;
     wanted = key;
     moments = [];
+    choice.of(names, names.find((name) => name.startsWith("sas")) ?? names[0], (name) => algorithms.find((a) => a.name === name)?.title ?? name);
     if (!names.length) return;
-    choice.replaceChildren(...names.map((name) => el("option", { value: name }, algorithms.find((a) => a.name === name)?.title ?? name)));
-    read(names.find((name) => name.startsWith("sas")) ?? names[0]);
+    read();
   });
   clock.watch(() => !room.hidden && show());
 
-  async function read(name) {
+  async function read() {
     const key = wanted;
-    choice.value = name;
+    const name = choice.root.value;
     swatch.replaceChildren(lineSample(name, store.state.algorithms));
     const found = await momentsOf(store.state.run, name);
-    if (wanted !== key || choice.value !== name) return;
+    if (wanted !== key || choice.root.value !== name) return;
     moments = found;
     shown = -2;
     show();

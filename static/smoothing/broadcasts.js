@@ -4,6 +4,7 @@ import { el, part, say } from "../look/dom.js";
 import { clockTime, metres, number, plural } from "../look/format.js";
 import { vehicleColour } from "../look/palette.js";
 import { dot } from "../look/swatch.js";
+import { keptChoice } from "../state/choice.js";
 import { clock } from "../state/clock.js";
 import { store } from "../state/store.js";
 import { drawChain } from "./chain.js";
@@ -11,12 +12,12 @@ import { chainAt, storyOf, tellers } from "./story.js";
 
 export function mountBroadcasts() {
   const room = part("broadcasts");
-  const whose = el("select", { "aria-label": "Estimator whose broadcasts are listed" });
+  const whose = keptChoice("broadcasts", "Estimator whose broadcasts are listed", read);
   const tally = el("span", { class: "quiet" });
   const list = el("ul", { role: "listbox", tabindex: 0, "aria-label": "Broadcasts" });
   const detail = el("div", { class: "detail", "aria-live": "polite" });
   room.append(
-    el("div", { class: "heading" }, el("h2", {}, "Broadcasts"), whose, tally),
+    el("div", { class: "heading" }, el("h2", {}, "Broadcasts"), whose.root, tally),
     el("div", { class: "inspector" }, list, detail),
   );
 
@@ -24,24 +25,20 @@ export function mountBroadcasts() {
   let chosen = -1;
   let wanted = "";
 
-  whose.addEventListener("change", read);
   store.watch(["view", "job", "algorithms"], ({ view, job, algorithms }) => {
     const names = job?.state === "done" ? tellers(view).filter((name) => !view.algorithms[name].centralized) : [];
     room.hidden = !names.length;
-    const title = (name) => algorithms?.find((a) => a.name === name)?.title ?? name;
-    const before = whose.value;
-    whose.replaceChildren(...names.map((name) => el("option", { value: name }, title(name))));
-    if (names.includes(before)) whose.value = before;
+    whose.of(names, names[0], (name) => algorithms?.find((a) => a.name === name)?.title ?? name);
     if (names.length) read();
     else wanted = "";
   });
 
   async function read() {
     const { run } = store.state;
-    const key = `${run} ${whose.value}`;
+    const key = `${run} ${whose.root.value}`;
     if (wanted === key) return;
     wanted = key;
-    const story = await storyOf(run, whose.value);
+    const story = await storyOf(run, whose.root.value);
     if (wanted !== key) return;
     told = story?.broadcasts ?? [];
     list.replaceChildren(...told.map(entry));

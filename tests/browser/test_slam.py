@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -68,6 +70,11 @@ def test_each_measurement_is_looked_into(page: Page, heard: str, keep):
     keep(page)
     room.get_by_label("Estimator").select_option("sas_all_priors")
     expect(words).to_contain_text("Measurement 1 of 3")
+    expect(page).to_have_url(re.compile("heard=sas_all_priors"))
+    other = page.context.new_page()
+    other.goto(page.url)
+    expect(other.locator("#listening").get_by_label("Estimator")).to_have_value("sas_all_priors")
+    other.close()
     page.locator("#stage").focus()
     page.keyboard.press("Home")
     expect(words).to_contain_text("Nothing was measured yet")
