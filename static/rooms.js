@@ -27,4 +27,8 @@ export function mountRooms() {
     part("runs-room").hidden = room !== "runs";
     part("claims-room").hidden = room !== "claims";
   });
+  store.watch(["room", "job", "compared"], ({ room, job, compared }) => {
+    const place = room !== "workbench" ? (compared.length ? "Comparison" : ROOMS[room].label) : job?.title;
+    document.title = place ? `${place} · coopnav` : "coopnav";
+  });
 }

@@ -20,7 +20,6 @@ export function mountHeadline() {
     head.hidden = run === null;
     const busy = atWork(job);
     bar.hidden = cancel.hidden = !busy;
-    document.title = job ? `${job.title} · coopnav` : "coopnav";
     if (!job) {
       title.textContent = "Opening the run…";
       about.textContent = state.textContent = "";

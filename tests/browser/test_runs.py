@@ -89,12 +89,14 @@ def test_two_runs_are_compared_against_the_pinned_one(page: Page, server: Server
     expect(scenarios.get_by_role("row", name=re.compile("^seed"))).to_contain_text("21")
     keep(page)
 
+    expect(page).to_have_title("Comparison · coopnav")
     address = page.url
     again = page.context.new_page()
     again.goto(address)
     expect(again.locator(".overlay[data-quantity=error_m] .js-line")).to_have_count(2)
     again.get_by_role("link", name="All runs").click()
     expect(row(again, solo)).to_be_visible()
+    expect(again).to_have_title("Runs · coopnav")
     httpx.patch(f"{server.url}/api/jobs/{solo}", json={"pinned": False})
 
 
