@@ -15,8 +15,13 @@ class Most(float):
     """A figure of which the largest over all trials is told."""
 
 
+class Example(str):
+    """One of several: the first over all trials is told."""
+
+
 #: A name, a count (which adds up over trials), or another figure.
-Figure = str | int | Least | Most
+Figure = str | int | Least | Most | Example
+_NAMED = {kind.__name__: kind for kind in (Least, Most, Example)}
 
 
 @dataclass(frozen=True, init=False)
@@ -39,14 +44,13 @@ class Note:
 
     def plain(self) -> list[Any]:
         """The note in JSON's types."""
-        return [self.words, *([type(f).__name__, float(f)] if isinstance(f, float) else f for f in self.figures)]
+        return [self.words, *([type(f).__name__, f] if type(f) in _NAMED.values() else f for f in self.figures)]
 
 
 def of_plain(written: list[Any]) -> Note:
     """The note that `Note.plain` wrote."""
-    kinds = {"Least": Least, "Most": Most}
     words, *figures = written
-    return Note(words, *(kinds[f[0]](f[1]) if isinstance(f, list) else f for f in figures))
+    return Note(words, *(_NAMED[f[0]](f[1]) if isinstance(f, list) else f for f in figures))
 
 
 def join(notes: Iterable[Note | str]) -> tuple[Note, ...]:
@@ -54,7 +58,7 @@ def join(notes: Iterable[Note | str]) -> tuple[Note, ...]:
     kinds: dict[tuple[str, ...], Note] = {}
     for given in notes:
         note = Note("{}", given) if isinstance(given, str) else given
-        kind = (note.words, *(f for f in note.figures if isinstance(f, str)))
+        kind = (note.words, *(f for f in note.figures if isinstance(f, str) and not isinstance(f, Example)))
         had = kinds.get(kind)
         kinds[kind] = note if had is None else Note(note.words, *map(_joined, had.figures, note.figures))
     return tuple(kinds.values())

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from scipy.special import bdtrc, chdtrc
 
+from engine.notes import Example, Most, Note
 from engine.registry import Progress
 from engine.slam.building import Plan, growths, name
 from engine.slam.densities import fit, from_gaussian
@@ -97,31 +98,30 @@ def by_kernels(algorithm: str, plan: Plan) -> Callable[[SlamMission, Progress], 
     return over_trials(solve)
 
 
-def _doubts(ends: list[Moment]) -> list[str]:
+def _doubts(ends: list[Moment]) -> list[Note]:
     """What the trials' last moments say against the answer, each kind once."""
     notes = []
-    arrays = [(pose, said) for end in ends for pose, said in end.cautions.items()]
-    doubtful = [(pose, said) for pose, said in arrays if said]
+    doubtful = [(pose, said) for end in ends for pose, said in end.cautions.items() if said]
     if doubtful:
         pose, said = doubtful[0]
-        notes.append(f"{len(doubtful)} of {len(arrays)} arrays, such as the one from pose {pose}: {'; '.join(said)}")
+        example = Example(f"the one from pose {pose}: {'; '.join(said)}")
+        notes.append(Note("{} arrays are not what the beamformer takes them for, such as {}", len(doubtful), example))
     known = [end.misfit for end in ends if end.misfit is not None]
     unlikely = [m for m in known if m.freedom > 0 and chdtrc(m.freedom, m.squares) < UNLIKELY]
     if unlikely:
-        worst = max(unlikely, key=lambda m: m.squares / m.freedom)
-        notes.append(
-            f"residuals do not fit the model in {len(unlikely)} of {len(known)} trials: their squares sum to "
-            f"{worst.squares:.0f} where about {worst.freedom} was expected; is a clock, the sound speed or a noise "
-            "wrong?"
+        words = (
+            "residuals do not fit the model in {} trials: their squares sum to {:.1f} times what is expected in the "
+            "worst; is a clock, the sound speed or a noise wrong?"
         )
+        notes.append(Note(words, len(unlikely), Most(max(m.squares / m.freedom for m in unlikely))))
     refusing = [m for m in known if bdtrc(m.refused - 1, m.ranges, m.doubt) < UNLIKELY]
     if refusing:
-        worst = max(refusing, key=lambda m: m.refused / m.ranges)
-        notes.append(
-            f"ranges do not fit each other in {len(refusing)} of {len(known)} trials: {worst.refused} of "
-            f"{worst.ranges} were refused where about {worst.ranges * worst.doubt:.0f} was expected; is a clock, the "
-            "sound speed or the direct path wrong?"
+        words = (
+            "ranges do not fit each other in {} trials: {:.0%} of them were refused in the worst where about {:.0%} "
+            "was expected; is a clock, the sound speed or the direct path wrong?"
         )
+        worst = max(refusing, key=lambda m: m.refused / m.ranges)
+        notes.append(Note(words, len(refusing), Most(worst.refused / worst.ranges), Most(worst.doubt)))
     return notes
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from engine import runner
-from engine.notes import Least, Most, Note, join, of_plain
+from engine.notes import Example, Least, Most, Note, join, of_plain
 from engine.scenario import library, toml
 
 
@@ -20,6 +20,12 @@ def test_counts_add_up_and_the_furthest_figures_stay():
         "1 of auv-2, after 5 s, up to 9.0 m",
     ]
     assert str(join([*joined, joined[0]])[0]) == "10 of auv-1, after 12 s, up to 4.0 m"
+
+
+def test_of_examples_the_first_is_told():
+    notes = [Note("{} arrays, such as {}", 2, Example(where)) for where in ("pose 3", "pose 9")]
+    again = of_plain(json.loads(json.dumps(notes[1].plain())))
+    assert [str(note) for note in join([notes[0], again])] == ["4 arrays, such as pose 3"]
 
 
 def test_a_note_is_written_and_read_again():
