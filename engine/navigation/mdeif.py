@@ -405,7 +405,7 @@ class MdeifNode:
             if count.any():
                 notes.append(
                     Note(
-                        "skipped {} packets of {} in {} trials: their origin was too old to recover the step from",
+                        "skipped {} packets of {} in {} trials: too old or too damaged to recover the step from",
                         *(int(count.sum()), self.member.names[sender], int((count > 0).sum())),
                     )
                 )
