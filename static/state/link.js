@@ -88,6 +88,12 @@ function current() {
   return runLink(run, { t, vehicle, ...Object.fromEntries([...kept].map(([key, { write }]) => [key, write()])) });
 }
 
+/** A run takes the open one's place: the way back does not lead to that. */
+export function replaceInLink(id) {
+  history.replaceState(null, "", runLink(id));
+  settled = location.hash;
+}
+
 /** Writes the address; another run or room is a new entry in the browser's history. */
 function put(hash) {
   if (hash === location.hash || location.hash !== settled) return;

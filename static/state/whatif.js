@@ -5,7 +5,7 @@ import { Problem } from "../wire/api.js";
 import { follow } from "../wire/events.js";
 import { inOrder } from "../whatif/edits.js";
 import { suspect } from "./connection.js";
-import { runLink } from "./link.js";
+import { replaceInLink } from "./link.js";
 import { atWork, replaceRun } from "./run.js";
 import { createStore, store } from "./store.js";
 
@@ -68,7 +68,7 @@ async function fly() {
     const { job, view, result } = await flown(body, signal, true);
     const before = shown;
     shown = job.id;
-    if (store.state.run !== null && store.state.run === before) history.replaceState(null, "", runLink(job.id));
+    if (store.state.run !== null && store.state.run === before) replaceInLink(job.id);
     const replaced = replaceRun(job, view, result);
     whatif.set({ state: "shown", took_s: (performance.now() - began) / 1000 });
     if (before !== null && before === replaced) forget(before);

@@ -72,6 +72,9 @@ def test_dragging_packet_loss_flies_the_mission_again(panel: Page, server: Serve
     flown(page)
     until(lambda: [j["state"] for j in trials_run(server)] == ["done"], "the older what-ifs to be gone")
     assert list(trials_run(server)[0]["changes"]) == ["network.loss"]
+    page.locator(".chip[data-name=nekf]").click()
+    expect(page).to_have_url(re.compile(r"&hide=nekf"))
+    expect(page).not_to_have_url(re.compile(re.escape(first.split("&")[0])))
 
 
 def test_any_key_can_be_found_typed_and_reverted(panel: Page):
