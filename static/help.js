@@ -44,7 +44,7 @@ function openHelp() {
     { class: "help", "aria-labelledby": "help-title" },
     el("h2", { id: "help-title" }, "Keys"),
     el("table", {}, el("tbody", {}, ...rows)),
-    el("p", {}, "Every address can be sent to someone: it holds run, estimators, vehicle, time, camera and layout."),
+    el("p", {}, "Every address can be sent to someone: it holds run, estimators, vehicle, time, camera, layout and what is drawn."),
     el(
       "div",
       { class: "buttons" },

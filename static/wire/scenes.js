@@ -62,6 +62,7 @@ export class SceneSession {
 
   /** What the panes draw, as the server's options have it. */
   options(settings) {
+    if (settings.top !== this.settings.top) this.pose = null;
     this.settings = { ...this.settings, ...settings };
     this.send({ type: "options", ...this.settings });
   }

@@ -19,7 +19,7 @@ const FILES = [
 export function mountPass() {
   const report = el("a", { class: "button", target: "_blank", title: "The run as one page, in a new tab" }, "Report");
   const word = el("span", { class: "word", role: "status" });
-  const address = el("button", { type: "button", class: "small", title: "Whoever opens it sees this run as you do: estimators, vehicle, time, camera and layout", onclick: share }, "Copy the address");
+  const address = el("button", { type: "button", class: "small", title: "Whoever opens it sees this run as you do: estimators, vehicle, time, camera, layout and what is drawn", onclick: share }, "Copy the address");
   const files = FILES.map(({ words, hint }) => el("a", { class: "button small", title: hint, onclick: () => close(sheet) }, words));
   const scenario = el("button", { type: "button", class: "small", title: "The mission as it was run, with its seed and trials", onclick: saveScenario }, "Scenario (TOML)");
   const sheet = menu("view-menu pass", el("summary", {}, "Share"), el("div", { class: "sheet" }, address, files, scenario, word));

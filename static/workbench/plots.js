@@ -114,6 +114,6 @@ export function mountPlots() {
   });
   keepInLink("trials", {
     write: () => (settings.telling === "band" ? null : settings.telling),
-    read: (text) => change({ telling: text in TELLING ? text : "band" }),
+    read: (text) => change({ telling: Object.hasOwn(TELLING, text) ? text : "band" }),
   });
 }

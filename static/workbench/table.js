@@ -78,7 +78,7 @@ export function mountTable() {
   store.watch(["vehicle"], choose);
   darkScheme.addEventListener("change", draw);
   keepInLink("base", { write: () => chosen.baseline, read: (text) => change({ baseline: text }) });
-  keepInLink("figure", { write: () => chosen.figure, read: (text) => change({ figure: text in FIGURES ? text : null }) });
+  keepInLink("figure", { write: () => chosen.figure, read: (text) => change({ figure: Object.hasOwn(FIGURES, text) ? text : null }) });
 }
 
 /** What the table is about: the shown rows, the baseline, the figure, who is best. */

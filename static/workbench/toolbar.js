@@ -7,7 +7,7 @@ import { dot } from "../look/swatch.js";
 import { schedulers } from "../pursuit/story.js";
 import { listeners } from "../slam/story.js";
 import { tellers } from "../smoothing/story.js";
-import { LAYOUTS, hasWebGL, paneState } from "../state/panes.js";
+import { DEPTHS, LAYOUTS, SIZES, draw, hasWebGL, paneState } from "../state/panes.js";
 import { store } from "../state/store.js";
 import { takings } from "./takings.js";
 
@@ -26,19 +26,17 @@ const MORE = {
   contours: { label: "Densities", hint: "Lines of equal density of all trials, which hold 50 and 90 % of them", solid: true, trials: true },
   linked: { label: "Cameras linked", hint: "Panes turn together; unticked each by itself", solid: true },
 };
-const SIZES = { 95: "95 %", 1: "1 σ", 2: "2 σ", 3: "3 σ" };
-const DEPTHS = { 0: "as suits", 1: "true", 2: "× 2", 5: "× 5", 10: "× 10", 20: "× 20" };
 
 export function mountToolbar(session, panes) {
   const vehicles = el("div", { class: "vehicles", role: "radiogroup", "aria-label": "Vehicle" });
   const boxes = {};
   const toggle = ([name, { label, hint }]) => {
-    boxes[name] = el("input", { type: "checkbox", name: `pane-${name}`, onchange: () => paneState.set({ [name]: boxes[name].checked }) });
+    boxes[name] = el("input", { type: "checkbox", name: `pane-${name}`, onchange: () => draw({ [name]: boxes[name].checked }) });
     return el("label", { class: "toggle", title: hint }, boxes[name], label);
   };
   const layout = select("Panes", LAYOUTS, (value) => paneState.set({ layout: value }));
-  const sigma = select("Size of the ellipses", SIZES, (value) => paneState.set({ sigma: Number(value) }));
-  const depth = select("Depths stretched", DEPTHS, (value) => paneState.set({ depth: Number(value) }));
+  const sigma = select("Size of the ellipses", SIZES, (value) => draw({ sigma: Number(value) }));
+  const depth = select("Depths stretched", DEPTHS, (value) => draw({ depth: Number(value) }));
   for (const option of layout.options) option.disabled = !hasWebGL && option.value !== "plan";
   const row = (label, node, hint) => el("label", { class: "choice", title: hint }, el("span", {}, label), node);
   const more = menu(

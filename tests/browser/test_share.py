@@ -95,3 +95,26 @@ def test_whoever_opens_a_copied_address_sees_the_same(page: Page, run: str):
     expect(other.locator(".chip[data-name=nekf]")).to_have_attribute("aria-pressed", "false")
     # Two pages smooth their lines differently: a likeness, not a copy.
     until(lambda: difference(seen, pixels(other, "overlay")) < 0.02, "the same picture")
+
+
+def test_what_the_panes_draw_is_sent_with_the_address(page: Page, solo: str):
+    page.goto(f"/#run={solo}&draw=top,sigma9,-constructor")
+    see_the_vehicles(page, ["cekf"])
+    above = settled(page, "cekf")
+    expect(page.get_by_label("From above", exact=True)).to_be_checked()
+    page.get_by_label("From above", exact=True).uncheck()
+    until(lambda: difference(above, pixels(page, "cekf")) > 0.02, "the camera to turn")
+    page.get_by_label("From above", exact=True).check()
+    page.get_by_label("Rays", exact=True).uncheck()
+    page.locator("#toolbar .view-menu summary").click()
+    page.get_by_label("Size of the ellipses").select_option("3 σ")
+    page.keyboard.press("Escape")
+    expect(page).to_have_url(re.compile("draw=sigma3%2C-rays%2Ctop"))
+    page.wait_for_timeout(2000)
+    seen = settled(page, "cekf")
+    other = page.context.new_page()
+    other.goto(page.url)
+    for label, on in {"From above": True, "Rays": False, "Trails": True}.items():
+        expect(other.get_by_label(label, exact=True)).to_be_checked(checked=on)
+    expect(other.get_by_label("Size of the ellipses")).to_have_value("3")
+    until(lambda: difference(seen, pixels(other, "cekf")) < 0.02, "the same picture")

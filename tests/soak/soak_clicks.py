@@ -42,7 +42,7 @@ FOUND = """() => {
 
 #: What the address of a run promises to bring back.
 SHOWN = """() => {
-  const elsewhere = "#explorer, details, [aria-label='Playback speed']";
+  const elsewhere = "#explorer, [aria-label='Playback speed'], [aria-label='Length of a film']";
   return {
     run: new URLSearchParams(location.hash.slice(1)).get("run"),
     chips: [...document.querySelectorAll(".chip")].map((c) => [c.textContent, c.getAttribute("aria-pressed")]),
@@ -50,6 +50,7 @@ SHOWN = """() => {
     chosen: [...document.querySelectorAll("#workbench select")]
       .filter((s) => s.offsetParent && !s.closest(elsewhere))
       .map((s) => [s.getAttribute("aria-label"), s.value]),
+    drawn: [...document.querySelectorAll("[name^=pane-]")].map((b) => [b.name, b.checked]),
     time: document.querySelector(".now").textContent,
   };
 }"""
