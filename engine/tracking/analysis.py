@@ -13,8 +13,8 @@ from engine.tracking.rules import RULES
 from engine.tracking.steady import settle, settle_centrally
 
 MOST_STEPS, MOST_TRIALS, MOST_SENSORS = 500, 20_000, 8
-#: Measurements simulated at most, steps x trials x sensors: about two seconds.
-MOST_DRAWS = 4_000_000
+#: Measurements simulated at most, steps x trials x sensors, and without trials: together about two seconds.
+MOST_DRAWS, MOST_UPDATES = 2_000_000, 1_000
 WEIGHTS = 101
 
 
@@ -39,6 +39,8 @@ def analyse(
             raise ValueError(f"{name}: {value} is not between 1 and {most}")
     if len(sensors) > MOST_SENSORS:
         raise ValueError(f"sensors: {len(sensors)} given, at most {MOST_SENSORS}")
+    if steps * len(sensors) > MOST_UPDATES:
+        raise ValueError(f"steps: {steps} with {len(sensors)} sensors; at most {MOST_UPDATES} in all")
     if steps * trials * len(sensors) > MOST_DRAWS:
         raise ValueError(f"trials: {trials} over {steps} steps and {len(sensors)} sensors; at most {MOST_DRAWS} in all")
     model = make(process, sensors, prior)
@@ -57,21 +59,18 @@ def analyse(
 
 
 def _history(model: Model, draws: simulate.Draws, rule: recursion.Rule | None, node: int) -> dict[str, Any]:
-    seen = recursion.history(model, rule, draws.z[0].shape[1])
-    errors = simulate.estimate(model, draws, rule).mean[:, :, node, 0] - draws.target[..., 0]
+    answer = simulate.estimate(model, draws, rule)
     return {
-        "believed": [float(s.believed[node, 0, 0]) for s in seen],
-        "actual": [float(s.actual_of(node)[0, 0]) for s in seen],
-        **_monte_carlo(errors),
+        "believed": answer.believed[0, :, node, 0, 0].tolist(),
+        "actual": answer.actual[0, :, node, 0, 0].tolist(),
+        **_monte_carlo(answer.mean[:, :, node, 0] - draws.target[..., 0]),
     }
 
 
 def _central(model: Model, draws: simulate.Draws) -> dict[str, Any]:
-    P = [model.prior]
-    for _ in range(draws.z[0].shape[1]):
-        P.append(recursion.central(model, P[-1]))
-    variances = [float(p[0, 0]) for p in P]
-    errors = simulate.estimate_centrally(model, draws).mean[:, :, 0, 0] - draws.target[..., 0]
+    answer = simulate.estimate_centrally(model, draws)
+    variances = answer.believed[0, :, 0, 0, 0].tolist()
+    errors = answer.mean[:, :, 0, 0] - draws.target[..., 0]
     return {"believed": variances, "actual": variances, **_monte_carlo(errors)}
 
 

@@ -51,11 +51,11 @@ def _root(cov: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates (trials, T+1, N, n) of every node, believed covariances (trials or 1, T+1, N, n, n)."""
+    """Estimates (trials, T+1, N, n) of every node, believed and actual covariances (trials or 1, T+1, N, n, n)."""
 
     mean: np.ndarray
     believed: np.ndarray
-    last: Nodes
+    actual: np.ndarray
 
 
 def estimate(model: Model, draws: Draws, rule: Rule | None, heard: np.ndarray | None = None) -> Estimates:
@@ -64,7 +64,7 @@ def estimate(model: Model, draws: Draws, rule: Rule | None, heard: np.ndarray | 
     N = model.nodes
     nodes = recursion.start(model, () if heard is None else (trials,))
     y = np.repeat(draws.prior[:, None], N, axis=1)
-    means, believed = [y], [_led(nodes.believed, heard)]
+    means, seen = [y], [_apart(nodes)]
     for k in range(steps):
         nodes = recursion.predict(model, nodes)
         y = apply(model.F, y)
@@ -76,8 +76,9 @@ def estimate(model: Model, draws: Draws, rule: Rule | None, heard: np.ndarray | 
             nodes, W = recursion.fuse(nodes, rule, None if heard is None else heard[:, k])
             y = np.einsum("...abij,tbj->tai" if heard is None else "tabij,tbj->tai", W, y, optimize=True)
         means.append(y)
-        believed.append(_led(nodes.believed, heard))
-    return Estimates(np.stack(means, axis=1), np.stack(believed, axis=1), nodes)
+        seen.append(_apart(nodes))
+    believed, actual = np.stack(seen, axis=-4).reshape(2, -1, steps + 1, N, model.size, model.size)
+    return Estimates(np.stack(means, axis=1), believed, actual)
 
 
 def estimate_centrally(model: Model, draws: Draws) -> Estimates:
@@ -97,8 +98,9 @@ def estimate_centrally(model: Model, draws: Draws) -> Estimates:
         believed.append(P)
     everyone = np.repeat(np.stack(means, axis=1)[:, :, None], N, axis=2)
     cov = np.repeat(np.stack(believed)[None, :, None], N, axis=2)
-    return Estimates(everyone, cov, recursion.start(model))
+    return Estimates(everyone, cov, cov)
 
 
-def _led(believed: np.ndarray, heard: np.ndarray | None) -> np.ndarray:
-    return believed[None] if heard is None else believed
+def _apart(nodes: Nodes) -> np.ndarray:
+    """Believed and actual covariance of every node by itself, (2, ..., N, n, n)."""
+    return np.stack([nodes.believed, np.einsum("...aiaj->...aij", nodes.actual)])

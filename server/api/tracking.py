@@ -34,6 +34,8 @@ class Point(BaseModel):
 
     @model_validator(mode="after")
     def _bounded(self) -> Point:
+        if self.steps * len(self.sensors) > analysis.MOST_UPDATES:
+            raise ValueError(f"steps: steps x sensors is at most {analysis.MOST_UPDATES}")
         if self.steps * self.trials * len(self.sensors) > analysis.MOST_DRAWS:
             raise ValueError(f"trials: steps x trials x sensors is at most {analysis.MOST_DRAWS}")
         return self
