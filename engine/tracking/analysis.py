@@ -13,7 +13,7 @@ from engine.tracking.rules import RULES
 from engine.tracking.steady import settle, settle_centrally
 
 MOST_STEPS, MOST_TRIALS, MOST_SENSORS = 500, 20_000, 8
-#: Measurements simulated at most, steps x trials x sensors, and without trials: together about two seconds.
+#: Measurements simulated at most, steps x trials x sensors, and without trials: together about three seconds.
 MOST_DRAWS, MOST_UPDATES = 2_000_000, 1_000
 WEIGHTS = 101
 
