@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import ElementHandle, Error, Page, Route, sync_playwright
 
 from tests.browser.conftest import FIRST_LOOK, FLAGS, Watch, chromium, window
+from tests.server.living import Live
 from tests.soak.rig import rig
 from tests.soak.sizes import size
 
@@ -30,9 +31,10 @@ PATIENCE_MS = 1500
 #: What can be worked with now: kept in the page; its kind and name.
 FOUND = """() => {
   const any = "button, a[href^='#'], input:not([type=file]), select, summary, textarea, [tabindex='0'], .nsewdrag";
-  window.found = [...document.querySelectorAll(any)].filter((node) => {
+  const within = document.querySelector("dialog:modal") ?? document;
+  window.found = [...within.querySelectorAll(any)].filter((node) => {
     const { width, height } = node.getBoundingClientRect();
-    return !node.disabled && width > 1 && height > 1 && getComputedStyle(node).visibility !== "hidden";
+    return !node.disabled && width > 1 && height > 1 && node.checkVisibility({ visibilityProperty: true });
   });
   return found.map((node) => [
     node.tagName === "INPUT" ? node.type : node.tagName.toLowerCase(),
@@ -86,6 +88,8 @@ def work(page: Page, kind: str, node: ElementHandle, chance: random.Random) -> N
                 page.mouse.down()
                 page.mouse.move(box["x"] + chance.random() * box["width"], box["y"], steps=3)
                 page.mouse.up()
+        case "radio" | "checkbox":
+            node.evaluate("node => { node.scrollIntoView({ block: 'nearest' }); node.click(); }")
         case _:
             node.click(timeout=PATIENCE_MS)
 
@@ -115,14 +119,26 @@ def lost(page: Page) -> str:
     if "run=" not in page.url:
         return ""
     other = page.context.new_page()
-    other.goto(page.url)
+    address = ""
     for _ in range(30):
+        if page.url != address:  # it says more once a run that was being read is there
+            address = page.url
+            other.goto(address)
         other.wait_for_timeout(1000)
         here, there = page.evaluate(SHOWN), other.evaluate(SHOWN)
         if here == there:
             break
     other.close()
     return "\n".join(f"{key}: {here[key]} became {there[key]}" for key in here if here[key] != there[key])
+
+
+def anew(page: Page, live: Live, runs: list[str], chance: random.Random) -> None:
+    """Open one of the runs, made again where it was deleted."""
+    n = chance.randrange(len(runs))
+    if live.http.get(f"/api/jobs/{runs[n]}").status_code == 404:
+        runs[n] = live.done(RUNS[n])["id"]
+    page.goto(f"/#run={runs[n]}")
+    page.locator("#table tbody").first.wait_for()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -140,8 +156,8 @@ def test_nothing_fails_whatever_is_pressed(tmp_path: Path, told: Callable[..., N
             page.on("dialog", lambda dialog: dialog.accept())
             for n in range(size("clicks") // 5):
                 if n % ANEW == 0:
-                    page.goto(f"/#run={chance.choice(runs)}")
-                    page.locator("#table tbody tr").first.wait_for()
+                    trail.append("another run")
+                    anew(page, it.live, runs, chance)
                 trail.append(act(page, chance))
                 assert not watch.faults, "\n".join([*watch.faults, *trail[-LOOK:]])
                 if n % LOOK == LOOK - 1:
