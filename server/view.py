@@ -24,6 +24,8 @@ SPANS = 80
 FIX_GAP_S = 30.0
 #: The percentiles over trials that are shown: the middle one and a band.
 BAND = (0.05, 0.5, 0.95)
+#: The shares of all errors for which the view tells how large they are.
+SHARES = np.linspace(0.0, 1.0, 101)
 
 Parts = Sequence[tuple[Shard, Reference, Tracks]]
 
@@ -124,6 +126,7 @@ def _algorithm(
 def _subject(truth: np.ndarray | None, belief: Belief, keep: np.ndarray, first: bool) -> dict[str, Any]:
     over_time = curves(truth, belief)
     cov = belief.cov[0, keep]
+    error = errors(truth, belief)
     return {
         "mean": rounded(belief.mean[0, keep]) if first else [],
         "cov": rounded(np.stack([cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1]], axis=-1), 6) if first else [],
@@ -131,10 +134,26 @@ def _subject(truth: np.ndarray | None, belief: Belief, keep: np.ndarray, first: 
         "sigma_m": rounded(over_time.sigma_m[keep]),
         "nees": rounded(over_time.nees[keep]),
         "band": {
-            "error_m": _band(errors(truth, belief)[:, keep]),
+            "error_m": _band(error[:, keep]),
             "sigma_m": _band(sigma(belief)[:, keep]),
         },
+        "distribution_m": _distribution(truth, error, keep),
     }
+
+
+def _distribution(truth: np.ndarray | None, error: np.ndarray, keep: np.ndarray) -> list[float]:
+    """The errors (trials, T) m that SHARES of them, at the times kept, do not exceed; the last is the largest of all.
+
+    Empty where there is no reference, and where an estimate failed, so that its error is no number.
+    """
+    if truth is None:
+        return []
+    known = np.broadcast_to(np.isfinite(truth).all(axis=-1), error.shape)
+    if not known[:, keep].any() or not np.isfinite(error[known]).all():
+        return []
+    found = np.quantile(error[:, keep][known[:, keep]], SHARES)
+    found[-1] = error[known].max()
+    return rounded(found)
 
 
 def _band(value: np.ndarray, digits: int = 3) -> list[list[Any]] | None:

@@ -1,9 +1,11 @@
 // What is plotted over time of one vehicle: curves of the estimators that are shown, and where they should lie.
 
 import { metres, number } from "../look/format.js";
-import { lineStyle, vehicleColour } from "../look/palette.js";
+import { vehicleColour } from "../look/palette.js";
 import { departure, indexAt, sigmaOf } from "../state/samples.js";
 import { shownAlgorithms } from "../state/shown.js";
+import { curve } from "./curve.js";
+import { DISTRIBUTION } from "./distribution.js";
 
 /** How the trials are told: {label, of(trials)}. */
 export const TELLING = {
@@ -13,13 +15,10 @@ export const TELLING = {
 };
 
 /**
- * A curve: {algorithm, title, colour, dash, time_s, value, low, high}; low and high, where there are any, are the
- * band that nine of ten trials lie in.
+ * A curve over time: {…, time_s, value, low, high}; low and high, where there are any, are the band that nine of ten
+ * trials lie in, or what `edges` says.
  */
-function curve(state, name, time_s, value, rest = {}) {
-  const known = state.algorithms?.find((a) => a.name === name);
-  return { algorithm: name, title: known?.title ?? name, ...lineStyle(name, state.algorithms ?? []), time_s, value, ...rest };
-}
+const overTime = (state, name, time_s, value, rest = {}) => curve(state, name, { time_s, value, ...rest });
 
 const some = (values) => values?.some((v) => v !== null && v !== undefined);
 
@@ -32,21 +31,38 @@ function figure(key, ofFirst) {
       if (!told) return [];
       if (telling === "first") {
         const value = told.mean.map((mean, n) => ofFirst(mean, told.cov[n], view.truth[vehicle]?.[n]));
-        return some(value) ? [curve(state, name, view.time_s, value)] : [];
+        return some(value) ? [overTime(state, name, view.time_s, value)] : [];
       }
       const band = telling === "band" && key !== "nees" ? told.band?.[key] : null;
       const [low, value, high] = band ?? [null, told[key], null];
-      return some(value) ? [curve(state, name, view.time_s, value, band ? { low, high } : {})] : [];
+      return some(value) ? [overTime(state, name, view.time_s, value, band ? { low, high } : {})] : [];
     });
   };
 }
+
+/** The error of the drawn trial along an axis (0 east, 1 north), and two of the sigmas it should rarely leave. */
+function along(axis) {
+  return (state) => {
+    const { view, vehicle } = state;
+    return shownAlgorithms(state).flatMap((name) => {
+      const told = view?.algorithms[name]?.subjects[vehicle];
+      const value = (told?.mean ?? []).map((mean, n) => difference(mean[axis], view.truth[vehicle]?.[n]?.[axis]));
+      if (!some(value)) return [];
+      const high = told.cov.map((cov) => (cov[2 * axis] === null ? null : 2 * Math.sqrt(cov[2 * axis])));
+      const low = high.map((v) => (v === null ? null : -v));
+      return [overTime(state, name, view.time_s, value, { low, high, edges: ["-2 sigma", "+2 sigma"] })];
+    });
+  };
+}
+
+const difference = (a, b) => (typeof a === "number" && typeof b === "number" ? a - b : null);
 
 /** Sigma of the estimates that stream in, until there is a view. */
 function streamed(state) {
   return shownAlgorithms(state).flatMap((name) => {
     const live = state.live?.algorithms[name];
     const cov = live?.subjects[state.vehicle]?.cov;
-    return cov ? [curve(state, name, live.time_s, cov.map(sigmaOf))] : [];
+    return cov ? [overTime(state, name, live.time_s, cov.map(sigmaOf))] : [];
   });
 }
 
@@ -54,7 +70,7 @@ function streamed(state) {
 function surprise(state) {
   return shownAlgorithms(state).flatMap((name) => {
     const told = state.view?.algorithms[name]?.surprise?.[state.vehicle];
-    return told?.time_s.length ? [curve(state, name, told.time_s, told.value, { bounds: told })] : [];
+    return told?.time_s.length ? [overTime(state, name, told.time_s, told.value, { bounds: told })] : [];
   });
 }
 
@@ -64,7 +80,7 @@ function fromDeif(state) {
   const [a, b] = ["mdeif", "deif"].map((name) => view?.algorithms[name]?.subjects[vehicle]?.mean);
   if (!a?.length || !b?.length || state.hidden.algorithms.has("mdeif")) return [];
   const value = a.map((p, n) => departure(p, null, b[n])?.error_m ?? null);
-  return [curve(state, "mdeif", view.time_s, value)];
+  return [overTime(state, "mdeif", view.time_s, value)];
 }
 
 /** The series of a kind that concern the vehicle, or the fleet; one of a pair has the other's colour. */
@@ -78,7 +94,7 @@ function series(kind) {
         const other = s.subjects.find((subject) => subject !== vehicle);
         if (other !== undefined && state.hidden.vehicles.has(other)) return [];
         const [low, value, high] = (telling === "band" && s.band) || [null, s.value, null];
-        const drawn = curve(state, name, view.time_s, value, low ? { low, high } : {});
+        const drawn = overTime(state, name, view.time_s, value, low ? { low, high } : {});
         if (other === undefined) return [drawn];
         const place = view.subjects.findIndex((subject) => subject.name === other);
         return [{ ...drawn, title: `${drawn.title}, with ${other}`, colour: vehicleColour(Math.max(0, place)) }];
@@ -88,6 +104,17 @@ function series(kind) {
 }
 
 const kindOf = (key) => key.split("/")[0];
+
+const [EAST, NORTH] = ["East", "North"].map((name, axis) => ({
+  key: `${name.toLowerCase()}_m`,
+  title: `${name} error`,
+  unit: "m",
+  format: metres,
+  about: `Estimate minus truth, ${name.toLowerCase()}. Shaded: two sigmas either side of zero, which it leaves at 5 % of the times if they are right`,
+  curves: along(axis),
+  only: "first",
+  linear: true,
+}));
 
 const ESTIMATED = [
   {
@@ -129,6 +156,9 @@ const ESTIMATED = [
     only: "mean",
     bounds: (state) => surprise(state)[0]?.bounds ?? null,
   },
+  DISTRIBUTION,
+  EAST,
+  NORTH,
   {
     key: "from_deif",
     title: "Difference MDEIF to DEIF",
@@ -167,6 +197,7 @@ export function quantitiesOf({ view }) {
   const has = {
     nees: algorithms.some((a) => Object.values(a.subjects).some((s) => some(s.nees))),
     nis: algorithms.some((a) => Object.values(a.surprise ?? {}).some((s) => s.time_s.length)),
+    ...Object.fromEntries([EAST.key, NORTH.key, DISTRIBUTION.key].map((key) => [key, some(Object.values(view.truth).flat(2))])),
     from_deif: Boolean(view.algorithms.mdeif && view.algorithms.deif),
   };
   const estimated = ESTIMATED.filter((q) => has[q.key] ?? true);
@@ -181,9 +212,10 @@ export function drawingOf(quantity, state, telling) {
   return { curves, how: wordsOf(quantity, state, telling, curves.some((c) => c.low)), bounds: curves.length ? (quantity.bounds?.(state, telling) ?? null) : null };
 }
 
-function wordsOf({ only, kind, mean = "mean" }, { view, job }, telling, banded) {
+function wordsOf({ only, kind, how, mean = "mean" }, { view, job }, telling, banded) {
   const trials = view ? (job?.trials ?? 1) : 1;
   if (trials <= 1) return "";
+  if (how) return how(telling, trials);
   if (only === "first" || (telling === "first" && !only && !kind)) return "the trial drawn";
   return banded ? `median and 5–95 % of ${trials} trials` : `${mean} of ${trials} trials`;
 }

@@ -12,6 +12,30 @@ export function timeUnit(length) {
   return length <= 6 * 3600 ? [60, "min"] : [3600, "h"];
 }
 
+/** An axis in the page's colours. */
+export const axisOf = () => ({ color: token("--ink-2"), gridcolor: token("--line"), linecolor: token("--line"), zeroline: false, fixedrange: true, automargin: false, tickfont: { size: 11 } });
+
+/** An axis' title. */
+export const named = (text, standoff) => ({ text, standoff, font: { size: 12 } });
+
+/** A layout in the page's colours that leaves the pointer to the page. */
+export const paper = () => ({
+  margin: MARGIN,
+  showlegend: false,
+  autosize: true,
+  dragmode: false,
+  hovermode: false,
+  paper_bgcolor: "rgba(0,0,0,0)",
+  plot_bgcolor: "rgba(0,0,0,0)",
+  font: { family: token("--sans"), size: 12, color: token("--ink-2") },
+});
+
+/** A curve as plotly's line through x and y. */
+export function lineOf({ algorithm, title, colour, dash }, x, y) {
+  const dashes = dash ? dash.split(" ").map((d) => `${d}px`).join(",") : "solid";
+  return { type: "scatter", mode: "lines", name: title, meta: algorithm, x, y, line: { color: colour, width: 1.8, dash: dashes }, hoverinfo: "skip" };
+}
+
 /**
  * {data, layout} of curves and bounds over the span [from, to] s; `title` is the axis', `total` the mission's length.
  */
@@ -19,31 +43,15 @@ export function figureOf({ curves, bounds, title, span, total, logarithmic }) {
   const [unit, unitName] = timeUnit(total);
   const range = heights(curves, bounds, span, logarithmic);
   const floor = logarithmic ? 10 ** range[0] : -Infinity;
-  const axis = { color: token("--ink-2"), gridcolor: token("--line"), linecolor: token("--line"), zeroline: false, fixedrange: true, automargin: false, tickfont: { size: 11 } };
-  const data = curves.map(({ algorithm, title: name, colour, dash, time_s, value }) => ({
-    type: "scatter",
-    mode: "lines",
-    name,
-    meta: algorithm,
-    x: time_s.map((t) => t / unit),
-    y: value,
-    line: { color: colour, width: 1.8, dash: dash ? dash.split(" ").map((d) => `${d}px`).join(",") : "solid" },
-    hoverinfo: "skip",
-  }));
+  const axis = axisOf();
+  const data = curves.map((c) => lineOf(c, c.time_s.map((t) => t / unit), c.value));
   const faint = Math.max(0.06, 0.2 - 0.025 * curves.length);
   const shapes = curves.filter((c) => c.low).map((c) => area(c, c.colour, faint, unit, floor));
   if (bounds) shapes.push(area(bounds.time_s ? bounds : { ...bounds, time_s: span }, token("--ink-2"), 0.13, unit, floor));
   const layout = {
-    margin: MARGIN,
-    showlegend: false,
-    autosize: true,
-    dragmode: false,
-    hovermode: false,
-    paper_bgcolor: "rgba(0,0,0,0)",
-    plot_bgcolor: "rgba(0,0,0,0)",
-    font: { family: token("--sans"), size: 12, color: token("--ink-2") },
-    xaxis: { ...axis, range: span.map((t) => t / unit), title: { text: `mission time (${unitName})`, standoff: 6, font: { size: 12 } } },
-    yaxis: { ...axis, type: logarithmic ? "log" : "linear", range, dtick: logarithmic && range[1] - range[0] > 1.5 ? 1 : null, exponentformat: "SI", title: { text: title, standoff: 4, font: { size: 12 } } },
+    ...paper(),
+    xaxis: { ...axis, range: span.map((t) => t / unit), title: named(`mission time (${unitName})`, 6) },
+    yaxis: { ...axis, type: logarithmic ? "log" : "linear", range, dtick: logarithmic && range[1] - range[0] > 1.5 ? 1 : null, exponentformat: "SI", title: named(title, 4) },
     shapes: shapes.filter(Boolean),
   };
   return { data, layout };

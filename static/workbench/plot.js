@@ -1,7 +1,6 @@
-// One plot: its curves, the cursor at the clock's time, the values there or under the pointer, its menu.
+// One plot: its curves, what they are at the clock's time or under the pointer, its menu.
 
 import { el, part, say } from "../look/dom.js";
-import { clockTime } from "../look/format.js";
 import { close as closeMenu, menu } from "../look/menu.js";
 import { loadPlotly } from "../look/plotly.js";
 import { sample } from "../look/swatch.js";
@@ -11,10 +10,8 @@ import { store } from "../state/store.js";
 import { zoom } from "../state/zoom.js";
 import { drawingOf, valueAt } from "./curves.js";
 import { savePlot } from "./export.js";
-import { MARGIN, figureOf } from "./figure.js";
-
-/** A pointer that has moved less than this (px) has clicked, not brushed. */
-const STILL = 4;
+import { figureOf } from "./figure.js";
+import { overTime } from "./timeaxis.js";
 
 const NOTHING = {
   queued: "Waiting for the first trials…",
@@ -35,15 +32,15 @@ export function buildPlot(quantity, settings, changed) {
   );
   const legend = el("div", { class: "legend" });
   const drawing = el("div", { class: "drawing" });
-  const cursor = el("div", { class: "cursor", "aria-hidden": "true", hidden: true });
-  const probe = el("div", { class: "cursor probe", "aria-hidden": "true", hidden: true }, el("span"));
-  const brush = el("div", { class: "brush", "aria-hidden": "true", hidden: true });
   const empty = el("p", { class: "quiet" });
-  const canvas = el("div", { class: "canvas", title: "Click: go there. Drag: zoom. Double click: all of it." }, drawing, cursor, probe, brush, empty);
+  const canvas = el("div", { class: "canvas" }, drawing, empty);
   const head = el("div", { class: "head" }, el("span", { class: "name", title: quantity.about }, quantity.title), whose, how, log, keep);
   const root = el("figure", { class: "plot", "data-quantity": quantity.key }, el("figcaption", {}, head, legend), canvas);
 
+  const { own } = quantity;
+  const pointed = own ? null : overTime(canvas);
   let shown = { curves: [], bounds: null };
+  let width = 0;
   let values = [];
   let visible = false;
   let stale = false;
@@ -69,7 +66,7 @@ export function buildPlot(quantity, settings, changed) {
 
   async function save(format) {
     closeMenu(keep);
-    await savePlot(format, plotted());
+    await savePlot(format, plotted(), own);
   }
 
   /** Takes the state in; draws now if it can be seen, else when it can. */
@@ -103,7 +100,7 @@ export function buildPlot(quantity, settings, changed) {
     try {
       const Plotly = await loadPlotly();
       if (store.state.job === null) return;
-      const { data, layout } = figureOf(plotted());
+      const { data, layout } = (own?.figure ?? figureOf)(plotted());
       await Plotly.react(drawing, data, layout, { displayModeBar: false, responsive: false, doubleClick: false });
     } catch (error) {
       empty.hidden = false;
@@ -111,64 +108,15 @@ export function buildPlot(quantity, settings, changed) {
     }
   }
 
-  /** Puts the cursor where the clock is and the probe under the pointer, and the curves' values there into the legend. */
+  /** Puts the lines at the clock's and the pointer's time, and the curves' values there into the legend. */
   function point() {
-    const width = canvas.clientWidth - MARGIN.l - MARGIN.r;
-    const [from, to] = zoom.span;
-    const put = (line, time) => {
-      line.hidden = time === null || time < from || time > to || to <= from || !shown.curves.length || width <= 0;
-      if (!line.hidden) line.style.transform = `translateX(${(MARGIN.l + ((time - from) / (to - from)) * width).toFixed(1)}px)`;
-    };
-    put(cursor, clock.time);
-    put(probe, hover.time);
-    if (!probe.hidden) say(probe.firstChild, clockTime(hover.time));
-    for (const [node, curve] of values) say(node, quantity.format(valueAt(curve, hover.time ?? clock.time)));
+    pointed?.(shown.curves.length ? width : 0);
+    for (const [node, curve] of values) say(node, own ? own.told(curve) : quantity.format(valueAt(curve, hover.time ?? clock.time)));
   }
 
-  const share = (event) => {
-    const box = canvas.getBoundingClientRect();
-    return Math.min(Math.max((event.clientX - box.left - MARGIN.l) / (box.width - MARGIN.l - MARGIN.r), 0), 1);
-  };
-  const timeAt = (place) => {
-    const [from, to] = zoom.span;
-    return from + place * (to - from);
-  };
-  let pressed = null;
-  const release = () => {
-    pressed = null;
-    brush.hidden = true;
-  };
-  canvas.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0) return;
-    canvas.setPointerCapture(event.pointerId);
-    hover.at(null);
-    if (event.shiftKey) clock.seek(timeAt(share(event)));
-    else pressed = { x: event.clientX, place: share(event) };
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    if (pressed) {
-      const [a, b] = [pressed.place, share(event)].sort((one, other) => one - other);
-      brush.hidden = Math.abs(event.clientX - pressed.x) < STILL;
-      const width = canvas.clientWidth - MARGIN.l - MARGIN.r;
-      brush.style.left = `${MARGIN.l + a * width}px`;
-      brush.style.width = `${(b - a) * width}px`;
-    } else if (event.buttons === 1 && event.shiftKey) clock.seek(timeAt(share(event)));
-    else hover.at(timeAt(share(event)));
-  });
-  canvas.addEventListener("pointerup", (event) => {
-    if (!pressed) return;
-    const moved = Math.abs(event.clientX - pressed.x) >= STILL;
-    const here = timeAt(share(event));
-    if (moved) zoom.show(timeAt(pressed.place), here);
-    else clock.seek(here);
-    release();
-  });
-  canvas.addEventListener("pointercancel", release);
-  canvas.addEventListener("lostpointercapture", release);
-  canvas.addEventListener("dblclick", () => zoom.reset());
-  canvas.addEventListener("pointerleave", () => hover.at(null));
   const size = new ResizeObserver(() => {
-    if (drawing.data && canvas.clientWidth) window.Plotly.Plots.resize(drawing);
+    width = canvas.clientWidth;
+    if (drawing.data && width) window.Plotly.Plots.resize(drawing);
     point();
   });
   const sight = new IntersectionObserver(

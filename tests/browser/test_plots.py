@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
+import httpx
 import numpy as np
 import pytest
 from PIL import Image
@@ -30,8 +31,8 @@ def plot(page: Page, quantity: str) -> Locator:
 def ground(page: Page, quantity: str) -> dict[str, float]:
     """Where a plot's axes are on the screen."""
     found = plot(page, quantity)
-    found.locator(".nsewdrag").wait_for()
     page.evaluate("node => node.scrollIntoView({block: 'center'})", found.element_handle())
+    found.locator(".nsewdrag").wait_for()
     box = found.locator(".nsewdrag").bounding_box()
     assert box
     return dict(box)
@@ -118,6 +119,67 @@ def test_nees_has_the_bounds_of_the_chi_square(opened: Page):
     heights = sorted({float(corner.split(",")[1]) for corner in re.findall(r"[\d.e+-]+,[\d.e+-]+", path)})
     np.testing.assert_allclose(heights, chi2.ppf([0.025, 0.975], 6) / 3, rtol=1e-4)
     expect(plot(opened, "nees").locator(".how")).to_have_text("mean of 3 trials")
+
+
+def lines(page: Page, quantity: str) -> dict[str, dict[str, list[float]]]:
+    """What a plot draws, by estimator."""
+    found = page.evaluate(
+        "q => document.querySelector(`.plot[data-quantity=${q}] .drawing`).data.map(({meta, x, y}) => ({meta, x, y}))",
+        quantity,
+    )
+    return {line["meta"]: line for line in found}
+
+
+def test_errors_are_told_by_how_many_are_how_large(opened: Page, server: Server, run: str, keep):
+    chooser = opened.get_by_role("group", name="Plots")
+    chooser.get_by_role("button", name="Distribution of errors").click()
+    ground(opened, "distribution")
+    distribution = plot(opened, "distribution")
+    expect(distribution.locator(".js-line")).to_have_count(3)
+    expect(distribution.locator(".how")).to_have_text("all of 3 trials")
+    arrays = np.load(io.BytesIO(httpx.get(f"{server.url}/api/jobs/{run}/arrays").content))
+    error = np.linalg.norm(arrays["nekf/scout/mean"] - arrays["truth/scout"], axis=-1)
+    half, most = np.median(error), error.max()
+    for share, place in ((50, half), (100, most)):
+        found = np.interp(share, lines(opened, "distribution")["nekf"]["y"], lines(opened, "distribution")["nekf"]["x"])
+        assert found == pytest.approx(place, rel=0.02)
+    expect(distribution.locator(".entry").nth(2)).to_contain_text(f"most {float(f'{most:.3g}'):g} m")
+    keep(opened)
+    distribution.get_by_role("button", name="log").click()
+    until(lambda: axis(opened, "distribution", "xaxis")[1] == pytest.approx(np.log10(40), abs=2), "a logarithmic axis")
+    head, *body = csv.reader(io.StringIO(saved(opened, "distribution", "CSV").read_text()))
+    assert head == ["errors below (%)", "Dead reckoning (m)", "Centralized EKF (m)", "Naive EKF (m)"]
+    assert [float(row[3]) for row in body] == lines(opened, "distribution")["nekf"]["x"]
+    opened.get_by_label("Trials as").select_option(FIRST)
+    expect(distribution.locator(".how")).to_have_text("the trial drawn")
+    alone = np.percentile(np.linalg.norm(arrays["nekf/scout/mean"][0] - arrays["truth/scout"][0], axis=-1), [50, 95])
+
+    def drawn() -> bool:
+        return np.array(lines(opened, "distribution")["nekf"]["x"])[[50, 95]] == pytest.approx(alone, rel=0.02)
+
+    until(drawn, "the errors of the trial drawn")
+    opened.get_by_label("Trials as").select_option(MEDIAN)
+    distribution.get_by_role("button", name="log").click()
+    chooser.get_by_role("button", name="Distribution of errors").click()
+    expect(distribution).to_have_count(0)
+
+
+def test_an_error_along_an_axis_is_drawn_in_two_of_its_sigmas(opened: Page, server: Server, run: str, keep):
+    chooser = opened.get_by_role("group", name="Plots")
+    chooser.get_by_role("button", name="North error").click()
+    ground(opened, "north_m")
+    expect(plot(opened, "north_m").locator(".js-line")).to_have_count(3)
+    expect(plot(opened, "north_m").locator(".shapelayer path")).to_have_count(3)
+    view = server.get(f"/api/jobs/{run}/view")
+    told = view["algorithms"]["cekf"]["subjects"]["scout"]
+    north = np.array(told["mean"])[:, 1] - np.array(view["truth"]["scout"])[:, 1]
+    assert lines(opened, "north_m")["cekf"]["y"] == pytest.approx(north)
+    keep(opened)
+    head, *body = csv.reader(io.StringIO(saved(opened, "north_m", "CSV").read_text()))
+    place = head.index("Centralized EKF +2 sigma (m)")
+    assert float(body[-1][place]) == pytest.approx(2 * np.sqrt(told["cov"][-1][2]))
+    chooser.get_by_role("button", name="North error").click()
+    expect(plot(opened, "north_m")).to_have_count(0)
 
 
 def test_an_axis_is_logarithmic_and_linear_again(opened: Page):

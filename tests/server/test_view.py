@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,6 +47,24 @@ def test_the_band_is_that_of_all_trials(parts, told):
     band = told["algorithms"]["nekf"]["subjects"]["scout"]["band"]["error_m"]
     np.testing.assert_allclose(band, np.percentile(error, [5, 50, 95], axis=0), atol=6e-4)
     assert told["band"] == [0.05, 0.5, 0.95]
+
+
+def test_the_distribution_is_that_of_all_errors(parts, told):
+    error = joined(parts, "nekf", "scout")
+    shares = told["algorithms"]["nekf"]["subjects"]["scout"]["distribution_m"]
+    np.testing.assert_allclose(shares, np.percentile(error, np.arange(101)), atol=6e-4)
+
+
+def test_errors_without_a_reference_have_no_distribution(parts):
+    scenario, _ = parts
+    shard = Shard("nekf", (0,))
+    reference, tracks = runner.run_shard(scenario, shard, lambda *_: None)
+    belief = tracks.beliefs["scout"]
+    failed = replace(belief, mean=np.where(np.arange(belief.mean.shape[1])[:, None] == 7, np.nan, belief.mean))
+    for truth, subject in (({}, belief), (reference.truth, failed)):
+        found = replace(reference, truth=truth), replace(tracks, beliefs={"scout": subject})
+        told = view.build(work.outline(scenario), [(shard, *found)], ["nekf"])
+        assert told["algorithms"]["nekf"]["subjects"]["scout"]["distribution_m"] == []
 
 
 def test_differences_between_estimators_are_paired_by_trial(parts, told):
