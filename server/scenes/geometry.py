@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +14,10 @@ DEPTH_SHOWN, DEPTH_STRETCH = 0.7, 10.0
 #: chi-square with 2 degrees of freedom at 95 %: Mahalanobis radius of the ellipses.
 RADIUS_95 = float(np.sqrt(-2.0 * np.log(0.05)))
 CORNERS = 24
+#: Off by less than this (scene units) nobody sees a line to be: a pixel where a mission fills a large screen.
+UNSEEN = SPAN / 1000
+#: A dashed line has no more dashes and gaps than this.
+DASHES = 240
 
 
 @dataclass(frozen=True)
@@ -46,12 +51,50 @@ def segments(line: np.ndarray) -> np.ndarray:
     return pairs[np.isfinite(pairs.sum(axis=(1, 2)))]
 
 
+def essential(line: np.ndarray, most: int) -> np.ndarray:
+    """Indices of the points that a line (N, 3) needs to look as it does: none that is left out lies further than
+    UNSEEN from what is drawn, unless that takes more than `most` points (Douglas and Peucker 1973, the worst first).
+
+    Points that are not finite are kept: a line has a gap there.
+    """
+    gaps = np.flatnonzero(~np.isfinite(line.sum(axis=1)))
+    weight = np.full(len(line), 0.0)
+    weight[gaps] = np.inf
+    ends = np.unique(np.concatenate([[0], gaps - 1, gaps + 1, [len(line) - 1]]).clip(0, max(len(line) - 1, 0)))
+    weight[ends[: len(line)]] = np.inf
+    rest = [(int(i), int(j), np.inf) for i, j in pairwise(ends) if j - i > 1]
+    while rest:
+        first, last, limit = rest.pop()
+        inner, way = line[first + 1 : last] - line[first], line[last] - line[first]
+        share = np.clip(inner @ way / max(way @ way, np.finfo(float).tiny), 0.0, 1.0)
+        away = np.linalg.norm(inner - share[:, None] * way, axis=1)
+        worst = int(away.argmax())
+        if away[worst] <= UNSEEN:
+            continue
+        split = first + 1 + worst
+        weight[split] = limit = min(limit, float(away[worst]))
+        rest += [(i, j, limit) for i, j in ((first, split), (split, last)) if j - i > 1]
+    needed = np.flatnonzero(weight > 0)
+    return needed if len(needed) <= most else np.sort(np.argsort(-weight, kind="stable")[:most])
+
+
 def dashes(line: np.ndarray) -> np.ndarray:
-    """The segments (M, 2, 3) of a dashed line: dashes and gaps of one length, at least two segments long each."""
+    """The segments (M, 2, 3) of a dashed line: dashes and gaps of one length, which is longer where there were many."""
     pairs = segments(line)
     length = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=-1)
-    dash = max(SPAN / 80, 2 * float(length.mean())) if len(pairs) else 1.0
-    return pairs[(np.cumsum(length) - length) // dash % 2 == 0]
+    pairs, length = pairs[length > 0], length[length > 0]
+    end = np.cumsum(length)
+    if not len(end):
+        return pairs
+    dash = max(SPAN / 80, end[-1] / DASHES)
+    cuts = np.unique(np.concatenate([[0.0], end, np.arange(dash, end[-1], dash)]))
+    low, high = cuts[:-1], cuts[1:]
+    middle = (low + high) / 2
+    drawn = (middle // dash % 2 == 0) & (high - low > 1e-9)
+    low, high, of = low[drawn], high[drawn], np.searchsorted(end, middle[drawn])
+    start, way = pairs[of, 0], pairs[of, 1] - pairs[of, 0]
+    share = (np.stack([low, high], axis=1) - (end - length)[of, None]) / length[of, None]
+    return start[:, None] + share[..., None] * way[:, None]
 
 
 def radius(sigma: float) -> float:

@@ -13,7 +13,18 @@ import rich
 from server.scenes import ensemble, graph, inner, palette, pursuit, sound
 from server.scenes.ensemble import Ensemble
 from server.scenes.footage import Footage, Track, at
-from server.scenes.geometry import SPAN, Chart, compass, dashes, ellipses, radius, round_length, scale_bar, segments
+from server.scenes.geometry import (
+    SPAN,
+    Chart,
+    compass,
+    dashes,
+    ellipses,
+    essential,
+    radius,
+    round_length,
+    scale_bar,
+    segments,
+)
 from server.scenes.options import Options
 from server.scenes.trail import Trail, trail
 from server.view import thinned
@@ -97,8 +108,9 @@ class Pane:
             self._bearings()
             self._without = None
             self._truth = {
-                subject: dashes(chart.place(track[thinned(len(track), TRUTH_POINTS)], self._depth(subject)))
+                subject: dashes(line[essential(line, TRUTH_POINTS)])
                 for subject, track in footage.truth.items()
+                for line in (chart.place(track[thinned(len(track), TRUTH_POINTS)], self._depth(subject)),)
                 if self._moves(subject)
             }
             for n in range(len(footage.subjects), self._staged):

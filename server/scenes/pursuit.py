@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -108,7 +107,7 @@ def drawing(
     for place, waypoint, ink in zip(here, pursuit.waypoints_m[last], inks):
         drawn.lines.append(outlines(chart.place(waypoint[None]), _CORNERS, SQUARE))
         drawn.colours.append(ink)
-        drawn.thin.append(dashes(chart.place(place + np.linspace(0, 1, 24)[:, None] * (waypoint - place))))
+        drawn.thin.append(dashes(chart.place(np.stack([place, waypoint]))))
         drawn.thin_colours.append(ink)
     _messages(drawn, pursuit, moment_s, chart, look, dict(zip(pursuit.vehicles, here)), target)
     holder = _holder(pursuit, whose)
@@ -130,10 +129,7 @@ def _formation(drawn: Drawing, chart: Chart, look: palette.Look, here: np.ndarra
     drawn.thin.append(segments(chart.place(np.concatenate([here, here[:1]]))))
     drawn.thin_colours.append(look.faded(look.truth, 0.25))
     if wanted is not None:
-        corners = np.concatenate([wanted, wanted[:1]])
-        share = np.linspace(0.0, 1.0, 24, endpoint=False)[:, None]
-        sides = [start + share * (end - start) for start, end in pairwise(corners)]
-        drawn.thin.append(dashes(chart.place(np.concatenate([*sides, corners[:1]]))))
+        drawn.thin.append(dashes(chart.place(np.concatenate([wanted, wanted[:1]]))))
         drawn.thin_colours.append(shade)
 
 

@@ -46,7 +46,8 @@ POLICY = (
 )
 
 #: An unfocused pane must reconnect too; and a pane shows its scene alone.
-HEAD = """<script>document.hasFocus = () => true;</script><script src="/static/frames/pace.js"></script><style>
+HEAD = """<script>document.hasFocus = () => true;</script><script src="/static/frames/behind.js"></script>
+<script src="/static/frames/pace.js"></script><style>
 .mantine-Paper-root, .mantine-Notifications-root, .mantine-Affix-root { display: none !important; }
 </style>"""
 

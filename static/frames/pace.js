@@ -14,18 +14,22 @@
 
   const getContext = HTMLCanvasElement.prototype.getContext;
   const nextFrame = window.requestAnimationFrame.bind(window);
+  const noFrame = window.cancelAnimationFrame.bind(window);
   const turns = (window.parent.paneTurns ??= { holder: null, since: 0, waiting: new Map() });
   let software = null;
-  let gl = null;
+  /** Of the contexts of this frame: what is drawn behind each. */
+  const behind = new Map();
+  /** The contexts until one of them has a picture, of which the page is told. */
+  const blank = new Set();
 
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
     if (!String(kind).startsWith("webgl")) return getContext.call(this, kind, options);
     // What is drawn stays, for pictures of the pane.
     const context = getContext.call(this, kind, { ...options, preserveDrawingBuffer: true, antialias: software ? false : options?.antialias });
-    if (context !== null) {
-      software ??= inSoftware(context);
-      gl = context;
-    }
+    if (context === null) return null;
+    software ??= inSoftware(context);
+    if (!behind.has(context)) blank.add(context);
+    if (software && kind === "webgl2" && !behind.has(context)) behind.set(context, window.drawBehind(context));
     return context;
   };
 
@@ -36,7 +40,7 @@
 
   const asked = new Map();
   let count = 0;
-  let planned = false;
+  let planned = 0;
   let resting = 0;
   let awakeUntil = performance.now() + 2 * AWAKE_MS;
 
@@ -50,8 +54,7 @@
   function plan() {
     if (planned || resting) return;
     if (!software || performance.now() < awakeUntil) {
-      planned = true;
-      nextFrame(run);
+      planned = nextFrame(run);
     } else {
       resting = setTimeout(wake, REST_MS, 0);
     }
@@ -63,16 +66,15 @@
     if (!resting) return;
     clearTimeout(resting);
     resting = 0;
-    planned = true;
-    nextFrame(run);
+    planned = nextFrame(run);
   }
 
   function run(time) {
     if (software && !takeTurn()) {
-      nextFrame(run);
+      planned = nextFrame(run);
       return;
     }
-    planned = false;
+    planned = 0;
     const callbacks = [...asked.values()];
     asked.clear();
     for (const callback of callbacks) {
@@ -83,13 +85,25 @@
       }
     }
     if (software) giveBack();
+    else tell();
+  }
+
+  /** Tells the page once that there is a picture: before that canvases are transparent. */
+  function tell() {
+    const pixel = new Uint8Array(4);
+    for (const gl of blank) {
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      if (pixel[3] === 0) continue;
+      blank.clear();
+      window.frameElement?.dispatchEvent(new Event("picture"));
+    }
   }
 
   /** Whether this pane may draw now: who waits longest goes first; a pane that is hidden or closed no longer waits. */
   function takeTurn() {
     const { waiting } = turns;
     const now = Date.now();
-    const mine = { since: waiting.get(window)?.since ?? now, asked: now };
+    const mine = { since: waiting.get(window)?.since ?? now, asked: now, begin };
     waiting.set(window, mine);
     for (const [other, { asked }] of waiting) if (now - asked > GONE_MS) waiting.delete(other);
     if (turns.holder !== null && now - turns.since < PATIENCE_MS) return false;
@@ -100,18 +114,34 @@
     return true;
   }
 
-  /** Another pane may draw once this picture is done. */
+  /** Its turn has come: draws now, not with the next frame. */
+  function begin() {
+    noFrame(planned);
+    run(performance.now());
+  }
+
+  /** Another pane may draw once this picture is done and the page has it. */
   function giveBack() {
-    const fence = gl?.fenceSync?.(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) ?? null;
-    gl?.flush();
+    const made = [...behind.values()].filter((picture) => picture.drawn());
+    const fences = made.map(({ gl }) => [gl, gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0)]);
+    for (const { gl } of made) gl.flush();
+    const done = ([gl, fence]) => gl.isContextLost() || fence === null || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED;
     const look = () => {
-      const done = fence === null || gl.isContextLost() || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED;
-      if (!done && turns.holder === window) {
+      if (!fences.every(done) && turns.holder === window) {
         setTimeout(look, 4);
         return;
       }
-      gl?.deleteSync?.(fence);
-      if (turns.holder === window) turns.holder = null;
+      for (const [gl, fence] of fences) gl.deleteSync(fence);
+      for (const picture of made) picture.show();
+      if (made.length) nextFrame(() => setTimeout(release, 0));
+      else release();
+      tell();
+    };
+    const release = () => {
+      if (turns.holder !== window) return;
+      turns.holder = null;
+      const first = [...turns.waiting].filter(([other, { asked }]) => !other.closed && Date.now() - asked <= GONE_MS);
+      first.sort(([, a], [, b]) => a.since - b.since)[0]?.[1].begin();
     };
     setTimeout(look, 0);
   }

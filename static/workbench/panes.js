@@ -79,7 +79,7 @@ export function mountPanes(keys) {
     for (const [name, pane] of panes) if (name !== OVERLAY) say(pane.reading, reading(name, pane));
   }
 
-  /** A pane is unveiled when its frame is there and there is something to see in it. */
+  /** A pane is unveiled when there is a picture and something to see in it. */
   function unveil() {
     const { job, view, live } = store.state;
     for (const [name, pane] of panes) {
@@ -87,7 +87,7 @@ export function mountPanes(keys) {
       const told = { ...live?.algorithms, ...view?.algorithms };
       const estimates = name === OVERLAY ? Object.keys(told).length > 0 : Boolean(told[name]);
       const ended = job !== null && !atWork(job) && job.state !== "done";
-      pane.root.dataset.state = pane.loaded && estimates ? "shown" : "waiting";
+      pane.root.dataset.state = pane.drawn && estimates ? "shown" : "waiting";
       say(pane.veil, ended ? "No estimates were made." : estimates ? "Opening the pane…" : (WAITING[job?.state] ?? "Reading the run…"));
     }
   }
@@ -112,7 +112,7 @@ export function mountPanes(keys) {
         if (!address || !pane.frame) continue;
         pane.root.dataset.state = "waiting";
         if (pane.frame.getAttribute("src") !== address) {
-          pane.loaded = false;
+          pane.drawn = false;
           pane.frame.src = address;
         }
         unveil();
@@ -158,11 +158,10 @@ function build(name, flat, keys, unveil) {
     el("header", {}, title, verdict, reading, tag),
     el("div", { class: "view" }, frame ?? plan.canvas, veil),
   );
-  const pane = { root, title, verdict, reading, tag, frame, plan, veil, loaded: flat };
-  frame?.addEventListener("load", () => {
-    if (!frame.getAttribute("src")) return;
-    pane.loaded = true;
-    keys(frame.contentWindow);
+  const pane = { root, title, verdict, reading, tag, frame, plan, veil, drawn: flat };
+  frame?.addEventListener("load", () => frame.getAttribute("src") && keys(frame.contentWindow));
+  frame?.addEventListener("picture", () => {
+    pane.drawn = true;
     unveil();
   });
   return pane;
@@ -182,13 +181,12 @@ function reading(name, pane) {
     ? { times: view.time_s, mean: belief.mean, cov: belief.cov, truth: view.truth[vehicle] }
     : { times: live?.algorithms[name]?.time_s ?? [], ...live?.algorithms[name]?.subjects[vehicle] };
   const n = indexAt(shown.times, clock.time);
-  pane.reading.classList.remove("outside");
+  const away = n < 0 || !shown.mean ? null : departure(shown.mean[n], shown.cov[n], shown.truth?.[n]);
+  const outside = (away?.nees ?? 0) > CHI2_95;
+  pane.reading.classList.toggle("outside", outside);
   if (n < 0 || !shown.mean) return "";
   const sigma = `σ ${metres(sigmaOf(shown.cov[n]))}`;
-  const away = departure(shown.mean[n], shown.cov[n], shown.truth?.[n]);
   if (!away) return sigma;
-  const outside = away.nees !== null && away.nees > CHI2_95;
-  pane.reading.classList.toggle("outside", outside);
   pane.reading.title = `${vehicle}, the trial drawn: ${outside ? "the truth is outside" : "the truth is inside"} the 95 % ellipse`;
   return `error ${metres(away.error_m)} · ${sigma}`;
 }

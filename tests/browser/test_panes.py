@@ -195,8 +195,37 @@ def test_a_pane_that_went_while_it_waited_for_its_turn_keeps_no_other_waiting(pa
     page.goto(f"/#run={solo}")
     see_the_vehicles(page, ["cekf"])
     before = settled(page, "cekf")
-    page.evaluate("() => paneTurns.waiting.set((window.gone = {}), { since: 0, asked: Date.now() })")
+    page.evaluate("() => paneTurns.waiting.set((window.gone = {}), { since: 0, asked: Date.now(), begin() {} })")
     page.locator("#stage").focus()
     page.keyboard.press("Home")
     until(lambda: difference(before, pixels(page, "cekf")) > 0.005, "the pane to be drawn again")
     assert not page.evaluate("() => paneTurns.waiting.has(gone)")
+
+
+#: The canvas of the first pane.
+CANVAS = """() => {
+  const { contentDocument } = document.querySelector(".pane iframe");
+  return [...contentDocument.querySelectorAll("canvas")].find((canvas) => canvas.width > 1);
+}"""
+#: How opaque a canvas is where it is least so: 0 for one that nothing has been drawn on, 255 for a picture.
+OPAQUE = """(canvas) => {
+  const small = Object.assign(document.createElement("canvas"), { width: 8, height: 8 });
+  const pen = small.getContext("2d");
+  pen.drawImage(canvas, 0, 0, 8, 8);
+  return Math.min(...pen.getImageData(0, 0, 8, 8).data.filter((_, n) => n % 4 === 3));
+}"""
+LOSE = "(canvas) => (canvas.lost = canvas.getContext('webgl2').getExtension('WEBGL_lose_context')).loseContext()"
+
+
+def test_a_pane_is_unveiled_when_there_is_a_picture_and_draws_again_after_its_context_was_lost(page: Page, solo: str):
+    page.goto(f"/#run={solo}")
+    page.wait_for_function("() => document.querySelector('.pane')?.dataset.state === 'shown'", polling="raf")
+    canvas = page.evaluate_handle(CANVAS)
+    assert canvas.evaluate(OPAQUE) == 255
+    see_the_vehicles(page, ["cekf"])
+    canvas.evaluate(LOSE)
+    page.wait_for_timeout(500)
+    canvas.evaluate("(canvas) => canvas.lost.restoreContext()")
+    page.locator("#stage").focus()
+    page.keyboard.press("Home")
+    see_the_vehicles(page, ["cekf"])

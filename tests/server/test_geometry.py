@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,17 +12,21 @@ from hypothesis import strategies as st
 from server.scenes.footage import Track, at
 from server.scenes.geometry import (
     CORNERS,
+    DASHES,
     SPAN,
+    UNSEEN,
     Chart,
     chart,
     compass,
     dashes,
     ellipses,
+    essential,
     radius,
     round_length,
     scale_bar,
     segments,
 )
+from server.scenes.trail import trail
 
 UNIT = Chart((0.0, 0.0), 1.0, 1.0)
 
@@ -82,6 +88,56 @@ def test_half_of_a_dashed_line_is_drawn_in_dashes_of_one_length():
     gaps = np.diff(drawn[:, 0, 0])
     assert np.count_nonzero(gaps > 0.05) == pytest.approx(39, abs=1)
     assert gaps.max() < 0.15 and len(dashes(line[:1])) == 0
+
+
+def test_a_dash_round_a_corner_turns_with_it():
+    drawn = dashes(np.array([[0.0, 0, 0], [0.07, 0, 0], [0.07, 9.0, 0]]))
+    np.testing.assert_allclose(drawn[:2], [[[0, 0, 0], [0.07, 0, 0]], [[0.07, 0, 0], [0.07, 0.055, 0]]], atol=1e-12)
+    length = np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=-1)
+    assert length[:2].sum() == pytest.approx(SPAN / 80) and length[2:-1] == pytest.approx(SPAN / 80)
+    long = dashes(np.array([[0.0, 0, 0], [1000.0, 0, 0]]))
+    assert len(long) == DASHES / 2 and np.ptp(long[..., 0]) == pytest.approx(1000 * (1 - 1 / DASHES))
+
+
+def away(points: np.ndarray, line: np.ndarray) -> float:
+    """The largest distance of any of the points from a line through others."""
+    start, way = line[:-1], np.diff(line, axis=0)
+    square = np.maximum((way**2).sum(axis=1), 1e-300)
+    share = np.clip(((points[:, None] - start) * way).sum(axis=-1) / square, 0.0, 1.0)
+    return float(np.linalg.norm(points[:, None] - start - share[..., None] * way, axis=-1).min(axis=1).max())
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 300), st.floats(1e-4, 0.5))
+def test_what_a_line_is_drawn_without_nobody_sees(seed: int, count: int, rough: float):
+    line = np.cumsum(np.random.default_rng(seed).normal(0.0, rough, (count, 3)), axis=0)
+    needed = essential(line, count)
+    assert needed[0] == 0 and needed[-1] == count - 1 and np.all(np.diff(needed) > 0)
+    assert away(line, line[needed]) <= UNSEEN * (1 + 1e-9)
+    few = essential(line, max(2, len(needed) // 2))
+    assert len(few) == max(2, len(needed) // 2) and few[0] == 0 and few[-1] == count - 1
+    assert np.isin(few, needed).all()
+
+
+def test_a_straight_course_needs_its_corners_alone():
+    corners = np.array([[0.0, 0, 0], [4, 0, 0], [4, 1, 0], [0, 1, 0]])
+    course = np.concatenate([np.linspace(a, b, 100, endpoint=False) for a, b in pairwise(corners)] + [corners[-1:]])
+    assert essential(course, 600).tolist() == [0, 100, 200, 300]
+    course[150] = np.nan
+    assert essential(course, 600).tolist() == [0, 100, 149, 150, 151, 200, 300], "and the ends of a gap"
+    assert [essential(course[:n], 600).tolist() for n in range(3)] == [[], [0], [0, 1]]
+
+
+def test_a_trail_is_cut_off_at_the_moment_and_small_ellipses_have_half_the_corners():
+    time_s = np.arange(101.0)
+    mean = np.stack([time_s / 10, np.where(time_s < 50, 0.0, (time_s - 50) / 10)], axis=1)
+    cov = np.where(time_s < 50, 0.01, 0.25)[:, None] * [1.0, 0.0, 1.0]
+    made = trail(UNIT, Track(time_s, {"auv": mean}, {"auv": cov}), "auv", 0.0, 1.0, reports=101, most=(50, 3))
+    line, rings = made.until(75.0, np.array([7.5, 2.5, 0.0]))
+    np.testing.assert_allclose(line, [[[0, 0, 0], [5, 0, 0]], [[5, 0, 0], [7.5, 2.5, 0]]])
+    assert len(rings) == CORNERS // 2 + CORNERS, "the first, small, and the second"
+    np.testing.assert_allclose(np.linalg.norm(rings[: CORNERS // 2, 0, :2], axis=-1), 0.1)
+    np.testing.assert_allclose(rings[: CORNERS // 2, 1], np.roll(rings[: CORNERS // 2, 0], -1, axis=0), atol=1e-12)
+    assert len(made.until(100.0, np.zeros(3))[1]) == CORNERS // 2 + 2 * CORNERS
 
 
 @pytest.mark.parametrize(("metres", "round_"), [(1.0, 1), (1.9, 1), (4.99, 2), (50, 50), (73, 50), (999, 500)])
