@@ -17,6 +17,7 @@
   const noFrame = window.cancelAnimationFrame.bind(window);
   const turns = (window.parent.paneTurns ??= { holder: null, since: 0, waiting: new Map() });
   let software = null;
+  const met = new WeakSet();
   /** Of the contexts of this frame: what is drawn behind each. */
   const behind = new Map();
   /** The contexts until one of them has a picture, of which the page is told. */
@@ -27,9 +28,11 @@
     // What is drawn stays, for pictures of the pane.
     const context = getContext.call(this, kind, { ...options, preserveDrawingBuffer: true, antialias: software ? false : options?.antialias });
     if (context === null) return null;
+    if (met.has(context)) return context;
+    met.add(context);
+    blank.add(context);
     software ??= inSoftware(context);
-    if (!behind.has(context)) blank.add(context);
-    if (software && kind === "webgl2" && !behind.has(context)) behind.set(context, window.drawBehind(context));
+    if (software && kind === "webgl2") behind.set(context, window.drawBehind(context));
     return context;
   };
 
