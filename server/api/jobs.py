@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Header, Request, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from engine.scenario.models import ScenarioBase
-from server import artifacts, report
+from server import artifacts, report, tum
 from server.inline import from_json, with_values
 from server.jobs import Wanted
 from server.problems import Refusal
@@ -127,6 +127,14 @@ def arrays(id: str, here: Here) -> FileResponse:
     """arrays.npz of a finished job."""
     path = here.jobs.results.artifact(id, artifacts.ARRAYS)
     return FileResponse(path, media_type="application/octet-stream", filename=f"{id}-{artifacts.ARRAYS}")
+
+
+@router.get("/jobs/{id}/tracks", response_class=Response)
+def tracks(id: str, here: Here, trial: Annotated[int, Query(ge=0)] = 0) -> Response:
+    """A trial of a finished job as TUM text files in a ZIP, which evo and its like read."""
+    content = tum.zipped(here.jobs.results.artifact(id, artifacts.ARRAYS), trial)
+    named = {"content-disposition": f'attachment; filename="{id}-tracks.zip"'}
+    return Response(content, media_type="application/zip", headers=named)
 
 
 @router.get("/jobs/{id}/graphs/{algorithm}", response_class=FileResponse)

@@ -72,6 +72,7 @@ export const mark = (id, marks) => request(job(id), { method: "PATCH", body: mar
 export const ranScenario = (id, signal) => request(`${job(id)}/scenario`, { signal });
 export const resultPath = (id) => `${job(id)}/result`;
 export const arraysPath = (id) => `${job(id)}/arrays`;
+export const tracksPath = (id) => `${job(id)}/tracks`;
 export const reportPath = (id) => `${job(id)}/report`;
 export const analyseTracking = (body, signal) => request("/api/tracking/analysis", { method: "POST", body, signal });
 export const trackingRegions = (body) => request("/api/tracking/regions", { method: "POST", body });

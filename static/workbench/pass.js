@@ -14,6 +14,7 @@ const FILES = [
   { words: "Report (HTML)", hint: "One page that needs nothing else: figures, tables, scenario, versions, seed", path: api.reportPath, ending: "report.html" },
   { words: "Figures (JSON)", hint: "result.json: scenario, metrics of every estimator and vehicle, claims", path: api.resultPath, ending: "result.json" },
   { words: "Tracks (NPZ)", hint: "arrays.npz: truth, means and covariances of every trial", path: api.arraysPath, ending: "arrays.npz" },
+  { words: "Tracks (TUM)", hint: "The trial drawn as text files in a ZIP, for evo and its like: time, position, no rotation", path: api.tracksPath, ending: "tracks.zip" },
 ];
 
 export function mountPass() {

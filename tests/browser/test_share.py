@@ -7,6 +7,7 @@ import json
 import re
 import tomllib
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 from playwright.sync_api import Page, expect
@@ -44,7 +45,7 @@ def test_the_report_of_the_open_run_is_one_page_that_needs_nothing_else(page: Pa
 def test_numbers_and_scenario_of_the_open_run_are_saved_as_files(page: Page, server: Server, run: str):
     page.goto(f"/#run={run}&layout=plan")
     saved = {}
-    for words in ("Figures (JSON)", "Tracks (NPZ)", "Scenario (TOML)", "Report (HTML)"):
+    for words in ("Figures (JSON)", "Tracks (NPZ)", "Tracks (TUM)", "Scenario (TOML)", "Report (HTML)"):
         share(page)
         with page.expect_download() as download:
             page.locator("#actions .sheet").get_by_text(words, exact=True).click()
@@ -52,6 +53,7 @@ def test_numbers_and_scenario_of_the_open_run_are_saved_as_files(page: Page, ser
         expect(page.locator("#actions .sheet")).to_be_hidden()
     assert json.loads(saved["Figures (JSON)"])["algorithms"].keys() == {"dead_reckoning", "cekf", "nekf"}
     assert np.load(io.BytesIO(saved["Tracks (NPZ)"]))["cekf/scout/mean"].shape[0] == 3
+    assert "nekf-ship.txt" in ZipFile(io.BytesIO(saved["Tracks (TUM)"])).namelist()
     assert tomllib.loads(saved["Scenario (TOML)"].decode())["trials"] == 3
     assert b"<!doctype html>" in saved["Report (HTML)"][:100].lower()
 

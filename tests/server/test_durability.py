@@ -103,7 +103,11 @@ def test_a_damaged_result_is_not_served(frail: Live):
     id = frail.done(SHORT)["id"]
     folder = frail.settings.data / "jobs" / id
     assert artifacts.sound(folder)
-    for name, paths in (("arrays.npz", ("arrays", "report")), ("result.json", ("result",)), ("view.json", ("view",))):
+    for name, paths in (
+        ("arrays.npz", ("arrays", "tracks", "report")),
+        ("result.json", ("result",)),
+        ("view.json", ("view",)),
+    ):
         data = bytearray((folder / name).read_bytes())
         data[len(data) // 2] ^= 1
         (folder / name).write_bytes(data)
