@@ -74,26 +74,29 @@ class Cameras:
 
         @pane.server.on_client_connect
         def connected(client: viser.ClientHandle) -> None:
-            told, settled, turns = time.monotonic(), False, self._turns
-            deadline = told + SETTLE_S
+            settled, turns, deadline = False, self._turns, time.monotonic() + SETTLE_S
+
+            def turn() -> None:
+                """Tell it until it is there: what it is told while it starts it may forget, and then say no more."""
+                if settled or time.monotonic() > deadline or client.client_id not in pane.server.get_clients():
+                    return
+                _turn(client, self._poses.get(pane, self.pose))
+                self._loop.call_later(TELL_S, turn)
 
             @client.camera.on_update
             def moved(_: viser.CameraHandle) -> None:
-                nonlocal told, settled, turns, deadline
+                nonlocal settled, turns, deadline
                 pose, now = pane.said, time.monotonic()
                 if settled and turns != self._turns:
                     settled, deadline = False, now + TURN_S
+                    self._loop.call_soon_threadsafe(turn)
                 turns = self._turns
                 if settled:
                     self._loop.call_soon_threadsafe(self._lead, pane, pose)
                     return
-                wanted = self._poses.get(pane, self.pose)
-                settled = np.allclose(pose, wanted, atol=SAME) or now > deadline
-                if not settled and now - told > TELL_S:
-                    told = now
-                    _turn(client, wanted)
+                settled = np.allclose(pose, self._poses.get(pane, self.pose), atol=SAME) or now > deadline
 
-            _turn(client, self._poses.get(pane, self.pose))
+            self._loop.call_soon_threadsafe(turn)
 
     def leave(self, pane: Pane) -> None:
         self._poses.pop(pane, None)
@@ -105,6 +108,8 @@ class Cameras:
         self.pose, self._leader, self._moved = pose, None, time.monotonic()
         self._poses = dict.fromkeys(self._poses, pose)
         self._turns += 1
+        for pane in self._poses:
+            pane.begin_at(pose)
         self._follow()
 
     def shift(self, step: np.ndarray) -> None:
