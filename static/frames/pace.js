@@ -45,7 +45,8 @@
   let count = 0;
   let planned = 0;
   let resting = 0;
-  let awakeUntil = performance.now() + 2 * AWAKE_MS;
+  /** Until there is a picture, and some time beyond: what comes last, as labels do, is to be in it. */
+  let awakeUntil = Infinity;
 
   window.requestAnimationFrame = (callback) => {
     asked.set(++count, callback);
@@ -98,6 +99,7 @@
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
       if (pixel[3] === 0) continue;
       blank.clear();
+      awakeUntil = performance.now() + 2 * AWAKE_MS;
       window.frameElement?.dispatchEvent(new Event("picture"));
     }
   }

@@ -35,10 +35,10 @@ function spread(state, telling) {
 /** {data, layout} of the curves: errors across, shares upward. */
 function figureOf({ curves, logarithmic }) {
   const data = curves.map((c) => lineOf(c, c.error, PERCENTS));
-  const most = Math.max(...curves.map((c) => c.error[100]));
-  // A logarithmic axis begins where the fewest hundredths of any curve are: a first error may be next to nothing.
-  const least = Math.min(...curves.map((c) => c.error.find((e) => e > 0 && e > c.error[100] / 1e4) ?? most));
-  const ends = logarithmic ? [Math.log10(least) - 0.05, Math.log10(most || 1) + 0.05] : [0, 1.03 * most || 1];
+  const most = Math.max(0, ...curves.map((c) => c.error[100])) || 1;
+  // A logarithmic axis leaves out errors of next to nothing.
+  const least = Math.min(most, ...curves.map((c) => c.error.find((e) => e > c.error[100] / 1e4) ?? most));
+  const ends = logarithmic ? [Math.log10(least) - 0.05, Math.log10(most) + 0.05] : [0, 1.03 * most];
   const layout = {
     ...paper(),
     xaxis: { ...axisOf(), type: logarithmic ? "log" : "linear", range: ends, exponentformat: "SI", title: named("error (m)", 6) },

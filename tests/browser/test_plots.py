@@ -159,6 +159,12 @@ def test_errors_are_told_by_how_many_are_how_large(opened: Page, server: Server,
 
     until(drawn, "the errors of the trial drawn")
     opened.get_by_label("Trials as").select_option(MEDIAN)
+    for name in ("dead_reckoning", "cekf", "nekf"):
+        opened.locator(f".chip[data-name={name}]").click()
+    expect(distribution.locator(".js-line")).to_have_count(0)
+    expect(distribution).to_contain_text("Nothing of what is shown has this.")
+    opened.get_by_role("button", name="Show all").click()
+    expect(distribution.locator(".js-line")).to_have_count(3)
     distribution.get_by_role("button", name="log").click()
     chooser.get_by_role("button", name="Distribution of errors").click()
     expect(distribution).to_have_count(0)
