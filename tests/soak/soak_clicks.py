@@ -56,6 +56,8 @@ SHOWN = """() => {
     time: document.querySelector(".now").textContent,
   };
 }"""
+#: Whoever opens a run sees something of it: an address that hides every estimator is not taken at its word.
+SOME_SHOWN = """() => document.querySelector(".chip[data-kind=algorithms][aria-pressed=true]") !== null"""
 PAUSE = """() => document.querySelector("[title^='Pause']")?.click()"""
 
 
@@ -116,7 +118,7 @@ def lost(page: Page) -> str:
     """What the address of an open run does not bring back in another page, if anything."""
     page.evaluate(PAUSE)
     page.wait_for_timeout(1000)  # for the address to follow
-    if "run=" not in page.url:
+    if "run=" not in page.url or not page.evaluate(SOME_SHOWN):
         return ""
     other = page.context.new_page()
     address = ""
