@@ -212,8 +212,9 @@ export function drawingOf(quantity, state, telling) {
   return { curves, how: wordsOf(quantity, state, telling, curves.some((c) => c.low)), bounds: curves.length ? (quantity.bounds?.(state, telling) ?? null) : null };
 }
 
-function wordsOf({ only, kind, how, mean = "mean" }, { view, job }, telling, banded) {
-  const trials = view ? (job?.trials ?? 1) : 1;
+function wordsOf({ only, kind, how, mean = "mean" }, { view }, telling, banded) {
+  // Of a run that keeps statistics alone, or has lost trials, fewer have curves than were asked for.
+  const trials = Math.max(1, ...Object.values(view?.algorithms ?? {}).map((a) => a.trials));
   if (trials <= 1) return "";
   if (how) return how(telling, trials);
   if (only === "first" || (telling === "first" && !only && !kind)) return "the trial drawn";
